@@ -1,0 +1,50 @@
+# tribend's entry points; `make help` lists them. The rules behind them are in the parts below, in reading order.
+#
+#   BUILD=dir     put everything that is built into dir (default build, or build-sanitize)
+#   SANITIZE=1    build with the address and undefined-behaviour sanitizers
+#   CC=clang      another compiler
+
+SANITIZE ?= 0
+BUILD    ?= $(if $(filter 1,$(SANITIZE)),build-sanitize,build)
+CC       := $(if $(filter default,$(origin CC)),gcc,$(CC))
+SHELL    := /bin/bash
+.DEFAULT_GOAL := help
+.DELETE_ON_ERROR:
+MAKEFLAGS += --no-builtin-rules
+
+.PHONY: help setup all demo test bench lint format tables clean
+
+help: ## list these targets
+	@grep -hE '^[a-z-]+:.*## ' Makefile | awk -F ':.*## ' '{printf "  make %-10s %s\n", $$1, $$2}'
+
+setup: ## install the Debian packages that are missing (root or sudo; else prints the apt line)
+	@tests/tools/setup $(BUILD_PACKAGES)
+
+all: $(PROGRAMS) ## build the programs: tribend-tables and tribend
+
+demo: setup ## from the material to a bent tip, with pictures (sets up what is missing first)
+	@$(MAKE) --no-print-directory -j$(JOBS) all
+	@tests/tools/demo $(BUILD)
+
+test: setup ## build and run every test (sets up what is missing first)
+	@$(MAKE) --no-print-directory -j$(JOBS) all test-programs
+	@tests/tools/run_tests $(BUILD)
+
+bench: setup ## time an equilibrium, a table and the simulation on this machine
+	@$(MAKE) --no-print-directory -j$(JOBS) all bench-programs
+	@tests/tools/bench $(BUILD)
+
+lint: ## warnings as errors with gcc, clang and the ARM compiler; cppcheck; clang-tidy
+	@tests/tools/setup $(BUILD_PACKAGES) $(LINT_PACKAGES)
+	@$(MAKE) --no-print-directory -k -j$(JOBS) lint-all
+
+format: ## clang-format every C file
+	@clang-format -i $(ALL_C) $(ALL_H)
+
+tables: all ## rebuild the reference table tables/paper-semicircle.tbt from its module and material
+	$(BUILD)/tribend-tables build tables/modules/paper-semicircle.yaml -o tables/paper-semicircle.tbt
+
+clean: ## remove what was built
+	rm -rf build build-sanitize $(BUILD)
+
+include tests/tools/build.mk

@@ -1,0 +1,22 @@
+/* The schedule: binds the controller to a hal. One app_step() every CONTROLLER_STEP_US. */
+#ifndef TRIBEND_APP_H
+#define TRIBEND_APP_H
+
+#include "control/controller.h"
+#include "hal.h"
+
+struct app {
+    struct controller controller;
+    const struct hal *hal;
+    struct controller_command pending; /* set by app_command, consumed by the next step */
+    uint32_t hal_errors;               /* reads or writes that the hal refused */
+};
+
+void app_init(struct app *app, const struct hal *hal, const struct bend_table *table,
+              const struct controller_parameters *parameters);
+/* Hand over a command; the next step takes it. A later one replaces it. */
+void app_command(struct app *app, const struct controller_command *command);
+/* Read, step, write. False: a fault is latched. */
+bool app_step(struct app *app);
+
+#endif

@@ -1,0 +1,107 @@
+/* The controller: one pure step from sensor readings, command and time to valve duties.
+ *
+ * Owns no clock, no I/O, no heap. The same inputs from the same state give the same bits on every build.
+ * Units: Pa gauge, rad, us, m. float[3] is indexed by chamber. */
+#ifndef TRIBEND_CONTROLLER_H
+#define TRIBEND_CONTROLLER_H
+
+#include "control/bend_inverse.h"
+#include "control/bend_table.h"
+#include "control/pressure_loop.h"
+#include "control/tip_loop.h"
+#include "safety/limits.h"
+#include "safety/supervisor.h"
+
+#define CONTROLLER_STEP_US 1000
+
+enum controller_command_kind {
+    COMMAND_NONE = 0, /* nothing new this step */
+    COMMAND_VENT,
+    COMMAND_HOLD,
+    COMMAND_PRESSURE,
+    COMMAND_BEND,
+    COMMAND_CLEAR /* leave FAULT for SAFE, if its cause is gone */
+};
+
+/* A command counts as alive for controller_parameters.command_timeout_us; senders repeat it. */
+struct controller_command {
+    enum controller_command_kind kind;
+    float pressure_pa[3];     /* COMMAND_PRESSURE */
+    float bend_rad;           /* COMMAND_BEND, >= 0 */
+    float direction_rad;      /* COMMAND_BEND: where the tip moves, from +x counter-clockwise */
+    float co_contraction_pa;  /* COMMAND_BEND: least pressure of every chamber */
+};
+
+struct controller_parameters {
+    int64_t pwm_period_us;
+    int64_t tip_period_us;       /* expected; a sample overdue by tip_overdue_us opens the tip loop */
+    int64_t tip_overdue_us;
+    int64_t command_timeout_us;
+    struct pressure_loop_parameters pressure_loop;
+    struct tip_loop_parameters tip_loop;
+    struct limits_parameters limits;
+};
+
+struct controller_input {
+    int64_t time_us;
+    float pressure_pa[3];
+    bool pressure_ok[3];
+    float supply_pa;
+    bool supply_ok;
+    bool tip_new;
+    int64_t tip_measured_us;
+    float tip_position_m[3];
+    float tip_quaternion[4]; /* w, x, y, z */
+    uint16_t tip_quality;
+    uint16_t tip_status;
+    struct controller_command command;
+};
+
+struct controller_output {
+    float duty[3];
+    bool valves_enabled;
+    bool supply_enabled;
+};
+
+/* What status messages, logs and displays show. */
+struct controller_status {
+    enum supervisor_state state;
+    uint32_t faults;   /* latched, bit = enum supervisor_fault */
+    uint32_t warnings; /* present, bit = enum supervisor_warning */
+    float pressure_target_pa[3];
+    float pressure_estimate_pa[3];
+    float bend_rad;        /* measured where the tip is good, else predicted from pressures */
+    float direction_rad;
+    bool bend_is_measured;
+    struct bend_inverse_result inverse;
+    uint32_t tip_samples;
+    uint32_t tip_rejected;
+    uint32_t tip_lost_count;
+    uint32_t commands_refused;
+};
+
+struct controller {
+    const struct bend_table *table; /* NULL: pressure commands only */
+    struct controller_parameters parameters;
+    struct controller_status status;
+    /* state, see controller.c */
+    struct supervisor supervisor;
+    struct limits limits;
+    struct pressure_loop pressure_loop[3];
+    struct tip_loop tip_loop;
+    struct controller_command active;
+    int64_t command_us;
+    int64_t tip_us;
+    bool tip_lost;
+};
+
+/* The nominal board and plant of the design page; limits from the table's module where there is one. */
+void controller_default_parameters(struct controller_parameters *parameters, const struct bend_table *table);
+/* `table` (may be NULL) and `parameters` are kept: the table by pointer, the parameters by value. */
+void controller_init(struct controller *controller, const struct bend_table *table,
+                     const struct controller_parameters *parameters);
+/* One control step; called every CONTROLLER_STEP_US. Always fills `output`. */
+void controller_step(struct controller *controller, const struct controller_input *input,
+                     struct controller_output *output);
+
+#endif

@@ -1,0 +1,70 @@
+/* The cross-section solver: generalised plane strain in a bent frame, mixed P2-P1 (Taylor-Hood) elements, neo-Hookean
+ * and reduced-polynomial laws, follower pressure in three chambers.
+ *
+ *   F = [grad y 0; 0 F33],  F33 = stretch + kappa_x y_2 - kappa_y y_1
+ *   Pi = int W(F) dA - sum_i p_i V_i,   V_i = int over chamber i of F33 da
+ *
+ * Curvature and stretch are those of the line through the material point at the section's centre, with zero mean
+ * rotation of the section. See docs in section_solver.c for discretisation. */
+#ifndef TRIBEND_SECTION_SOLVER_H
+#define TRIBEND_SECTION_SOLVER_H
+
+#include <stdbool.h>
+#include <stddef.h>
+
+#include "description/module_description.h"
+
+struct section_mesh;
+struct section_solver;
+
+struct section_mesh_options {
+    double size_m; /* element edge at chamber walls; grows towards the core. 0: the default */
+};
+
+/* What one equilibrium says. Curvature components are those of the bend: the vector points where the tip moves. */
+struct section_state {
+    double pressure_pa[3];
+    double curvature_x_1pm;
+    double curvature_y_1pm;
+    double stretch;
+    double volume_m2[3];         /* deformed volume per reference length, int F33 da */
+    double width_bend_plane_m;   /* extent of the deformed outline along the bending direction (balloon included) */
+    double width_across_m;
+    double width_max_m;
+    double von_mises_apex_pa;    /* mean through the wall at the apex of the chamber with the highest pressure */
+    double stretch_max;          /* greatest principal stretch */
+    bool stable;
+    bool beyond_strain;          /* stretch over the material's fitted range */
+    bool contact;                /* walls of a cavity cross or touch */
+    int newton_iterations;
+};
+
+struct section_mesh *section_mesh_create(const struct module_description *module,
+                                         const struct section_mesh_options *options, struct description_error *error);
+void section_mesh_free(struct section_mesh *mesh);
+
+/* Solver for one thread; the mesh may be shared. NULL with a message when memory or factorisation set-up fails. */
+struct section_solver *section_solver_create(const struct section_mesh *mesh, const struct module_description *module,
+                                             struct description_error *error);
+void section_solver_free(struct section_solver *solver);
+
+/* Natural continuation from the present state to these pressures, steps cut as needed. False: no equilibrium was
+ * reached (a fold, or loss of convergence); the solver is then back at its last converged state. */
+bool section_solver_move_to(struct section_solver *solver, const double pressure_pa[3]);
+void section_solver_state(const struct section_solver *solver, struct section_state *state);
+/* Undeformed again. */
+void section_solver_reset(struct section_solver *solver);
+/* Save and restore the unknowns; `values` has section_solver_unknowns() doubles. */
+size_t section_solver_unknowns(const struct section_solver *solver);
+void section_solver_save(const struct section_solver *solver, double *values);
+void section_solver_restore(struct section_solver *solver, const double *values);
+
+/* Called after each converged point of a path; false stops it. */
+typedef bool (*section_path_callback)(void *context, const struct section_solver *solver,
+                                      const struct section_state *state);
+/* Pseudo-arc-length path in the factor of `direction_pa` (pressures = factor * direction), through limit points, from
+ * the undeformed state, until the callback stops it. False: the path broke down before; `error` says where. */
+bool section_solver_path(struct section_solver *solver, const double direction_pa[3], section_path_callback callback,
+                         void *context, struct description_error *error);
+
+#endif

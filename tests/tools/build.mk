@@ -1,0 +1,101 @@
+# How things are built: source lists, flags, one pattern rule a flag set, and the lint rules. Read by the Makefile.
+
+JOBS := $(shell nproc 2>/dev/null || echo 1)
+
+BUILD_PACKAGES := gcc libc6-dev pkg-config libgmsh-dev libsuitesparse-dev libgsl-dev libcyaml-dev libyaml-dev \
+                  zlib1g-dev libcmocka-dev gnuplot-nox fonts-dejavu-core
+LINT_PACKAGES  := clang clang-tidy cppcheck gcc-arm-none-eabi libnewlib-arm-none-eabi
+
+# --- sources: a folder is a layer; arrows between layers are include paths below
+FIRMWARE_C := $(wildcard firmware/*.c firmware/*/*.c)
+SIM_C      := $(wildcard hal/sim/*.c hal/sim/effects/*.c)
+MODEL_C    := $(filter-out model/cli/%,$(wildcard model/*/*.c))
+UNITS_C    := $(wildcard model/units/*.c)
+TABLES_CLI_C := $(wildcard model/cli/*.c)
+HOST_C     := $(filter-out host/cli/main.c,$(wildcard host/*/*.c))
+HOST_MAIN  := host/cli/main.c
+TEST_C     := $(wildcard tests/*/test_*.c)
+BENCH_C    := $(wildcard tests/bench/bench_*.c)
+SUPPORT_C  := $(filter-out $(TEST_C) $(BENCH_C),$(wildcard tests/*/*.c))
+ALL_C      := $(FIRMWARE_C) $(SIM_C) $(MODEL_C) $(TABLES_CLI_C) $(HOST_C) $(HOST_MAIN) $(TEST_C) $(BENCH_C) $(SUPPORT_C)
+ALL_H      := $(wildcard firmware/*.h firmware/*/*.h hal/*.h hal/*/*.h model/*/*.h host/*/*.h tests/*/*.h)
+
+# --- flags
+WARNINGS := -Wall -Wextra -Wpedantic -Wconversion -Wsign-conversion -Wshadow -Werror
+OPTIMISE := -O2 -g -fno-math-errno
+SANITIZE_FLAGS := $(if $(filter 1,$(SANITIZE)),-fsanitize=address$(comma)undefined -fno-sanitize-recover=all -fno-omit-frame-pointer)
+comma := ,
+# No fused multiply-add and no reassociation anywhere: the same inputs give the same bits on every build.
+EXACT := -ffp-contract=off
+INCLUDES := -Ifirmware -Ihal -Imodel -Ihost -Itests
+FIRMWARE_FLAGS := -std=c11 $(WARNINGS) -Wdouble-promotion $(EXACT) -fno-math-errno -Ifirmware -Ihal
+COMMON_FLAGS   := -std=gnu11 -D_GNU_SOURCE $(WARNINGS) $(EXACT) $(INCLUDES)
+MODEL_FLAGS    := $(COMMON_FLAGS) -fopenmp
+
+# --- objects and programs
+object = $(patsubst %.c,$(BUILD)/%.o,$(1))
+FIRMWARE_O := $(call object,$(FIRMWARE_C))
+SIM_O      := $(call object,$(SIM_C))
+MODEL_O    := $(call object,$(MODEL_C))
+UNITS_O    := $(call object,$(UNITS_C))
+TABLES_CLI_O := $(call object,$(TABLES_CLI_C))
+HOST_O     := $(call object,$(HOST_C))
+SUPPORT_O  := $(call object,$(SUPPORT_C))
+
+PROGRAMS := $(BUILD)/tribend-tables $(BUILD)/tribend
+TEST_PROGRAMS  := $(patsubst %.c,$(BUILD)/%,$(TEST_C))
+BENCH_PROGRAMS := $(patsubst %.c,$(BUILD)/%,$(BENCH_C))
+
+MODEL_LIBS := -lgmsh -lcholmod -lgsl -lgslcblas -lcyaml -lyaml -lz -fopenmp -lm
+
+$(BUILD)/firmware/%.o: firmware/%.c
+	@mkdir -p $(@D)
+	$(CC) $(OPTIMISE) $(SANITIZE_FLAGS) $(FIRMWARE_FLAGS) -MMD -MP -c $< -o $@
+$(BUILD)/model/%.o: model/%.c
+	@mkdir -p $(@D)
+	$(CC) $(OPTIMISE) $(SANITIZE_FLAGS) $(MODEL_FLAGS) -MMD -MP -c $< -o $@
+$(BUILD)/%.o: %.c
+	@mkdir -p $(@D)
+	$(CC) $(OPTIMISE) $(SANITIZE_FLAGS) $(COMMON_FLAGS) -MMD -MP -c $< -o $@
+
+link = $(CC) $(SANITIZE_FLAGS) $(filter %.o,$^) -o $@
+
+$(BUILD)/tribend-tables: $(TABLES_CLI_O) $(MODEL_O) $(FIRMWARE_O)
+	$(link) $(MODEL_LIBS)
+$(BUILD)/tribend: $(call object,$(HOST_MAIN)) $(HOST_O) $(SIM_O) $(FIRMWARE_O) $(UNITS_O)
+	$(link) -lm
+
+.PHONY: test-programs bench-programs
+test-programs: $(TEST_PROGRAMS)
+bench-programs: $(BENCH_PROGRAMS)
+
+# Tests of the model link its libraries; the others link what `tribend` links.
+$(BUILD)/tests/model/test_%: $(BUILD)/tests/model/test_%.o $(SUPPORT_O) $(MODEL_O) $(FIRMWARE_O)
+	$(link) -lcmocka $(MODEL_LIBS)
+$(BUILD)/tests/%: $(BUILD)/tests/%.o $(SUPPORT_O) $(HOST_O) $(SIM_O) $(FIRMWARE_O) $(UNITS_O)
+	$(link) -lcmocka -lm
+
+.SECONDARY:
+-include $(patsubst %.c,$(BUILD)/%.d,$(ALL_C))
+
+# --- lint: every compiler that the firmware must build with, then the analysers
+ARM_FLAGS := -mcpu=cortex-m4 -mthumb -mfloat-abi=hard -mfpu=fpv4-sp-d16 -Os
+CPPCHECK_FLAGS := --enable=warning,performance,portability --inline-suppr --error-exitcode=1 --quiet \
+                  --suppress=missingIncludeSystem --suppress=unknownMacro $(INCLUDES) --std=c11
+HOST_SIDE_C := $(filter-out $(FIRMWARE_C),$(ALL_C))
+
+.PHONY: lint-all lint-firmware lint-clang lint-cppcheck lint-tidy
+lint-all: lint-firmware lint-clang lint-cppcheck lint-tidy
+	@echo "lint: clean ($(words $(ALL_C)) C files)"
+lint-firmware:
+	@set -e; for c in "gcc -O2" "clang -O2" "arm-none-eabi-gcc $(ARM_FLAGS)"; do for f in $(FIRMWARE_C); do \
+	    $$c $(FIRMWARE_FLAGS) -c $$f -o /dev/null || { echo "lint: $$c rejects $$f"; exit 1; }; done; done
+lint-clang:
+	@set -e; for f in $(HOST_SIDE_C); do clang -O1 $(COMMON_FLAGS) -Wno-unknown-pragmas -Wno-source-uses-openmp \
+	    -fsyntax-only $$f; done
+lint-cppcheck:
+	@cppcheck -j$(JOBS) $(CPPCHECK_FLAGS) $(FIRMWARE_C) $(SIM_C) $(MODEL_C) $(TABLES_CLI_C) $(HOST_C) $(HOST_MAIN)
+lint-tidy:
+	@clang-tidy --quiet $(FIRMWARE_C) -- $(FIRMWARE_FLAGS) 2>/dev/null
+	@clang-tidy --quiet $(SIM_C) $(MODEL_C) $(TABLES_CLI_C) $(HOST_C) $(HOST_MAIN) -- $(COMMON_FLAGS) \
+	    -Wno-unknown-pragmas -Wno-source-uses-openmp 2>/dev/null
