@@ -72,6 +72,8 @@ bench-programs: $(BENCH_PROGRAMS)
 # Tests of the model link its libraries; the others link what `tribend` links.
 $(BUILD)/tests/model/test_%: $(BUILD)/tests/model/test_%.o $(SUPPORT_O) $(MODEL_O) $(FIRMWARE_O)
 	$(link) -lcmocka $(MODEL_LIBS)
+$(BUILD)/tests/bench/bench_model: $(BUILD)/tests/bench/bench_model.o $(MODEL_O) $(FIRMWARE_O)
+	$(link) $(MODEL_LIBS)
 $(BUILD)/tests/%: $(BUILD)/tests/%.o $(SUPPORT_O) $(HOST_O) $(SIM_O) $(FIRMWARE_O) $(UNITS_O)
 	$(link) -lcmocka -lm
 
