@@ -51,20 +51,33 @@ void section_solver_free(struct section_solver *solver);
 /* Natural continuation from the present state to these pressures, steps cut as needed. False: no equilibrium was
  * reached (a fold, or loss of convergence); the solver is then back at its last converged state. */
 bool section_solver_move_to(struct section_solver *solver, const double pressure_pa[3]);
-void section_solver_state(const struct section_solver *solver, struct section_state *state);
+void section_solver_state(struct section_solver *solver, struct section_state *state);
 /* Undeformed again. */
 void section_solver_reset(struct section_solver *solver);
 /* Save and restore the unknowns; `values` has section_solver_unknowns() doubles. */
 size_t section_solver_unknowns(const struct section_solver *solver);
 void section_solver_save(const struct section_solver *solver, double *values);
 void section_solver_restore(struct section_solver *solver, const double *values);
+/* Undeformed chamber area, m2. */
+double section_solver_chamber_area_m2(const struct section_solver *solver, size_t chamber);
+/* Deformed position of each mesh node, [2 * node_count], m, and greatest principal stretch of each triangle. */
+void section_solver_field(const struct section_solver *solver, double *position_m, double *triangle_stretch);
 
+enum section_goal { SECTION_GOAL_PRESSURE, SECTION_GOAL_CURVATURE };
 /* Called after each converged point of a path; false stops it. */
-typedef bool (*section_path_callback)(void *context, const struct section_solver *solver,
-                                      const struct section_state *state);
+typedef bool (*section_path_callback)(void *context, const struct section_state *state);
 /* Pseudo-arc-length path in the factor of `direction_pa` (pressures = factor * direction), through limit points, from
- * the undeformed state, until the callback stops it. False: the path broke down before; `error` says where. */
-bool section_solver_path(struct section_solver *solver, const double direction_pa[3], section_path_callback callback,
-                         void *context, struct description_error *error);
+ * the undeformed state to where the greatest pressure (Pa) or the curvature (1/m) first equals `goal_value`, on which
+ * the last point lies. False: the path broke down before, or the callback stopped it; `error` says where. */
+bool section_solver_path(struct section_solver *solver, const double direction_pa[3], enum section_goal goal,
+                         double goal_value, section_path_callback callback, void *context,
+                         struct description_error *error);
+
+/* For the check of the tangent against differences of the residual, at the solver's state. `vector`, `product` and
+ * `residual` have section_solver_equations() entries, without dimension; displace() adds to the unknowns. */
+size_t section_solver_equations(const struct section_solver *solver);
+bool section_solver_residual(struct section_solver *solver, double *residual);
+bool section_solver_tangent_product(struct section_solver *solver, const double *vector, double *product);
+void section_solver_displace(struct section_solver *solver, double factor, const double *vector);
 
 #endif
