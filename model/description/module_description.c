@@ -1,0 +1,274 @@
+/* tables/modules/NAME.yaml -> struct module_description. */
+#include "description/module_description.h"
+
+#include <libgen.h>
+#include <limits.h>
+#include <math.h>
+#include <stdio.h>
+#include <string.h>
+
+#include "description/module_check.h"
+#include "description/yaml_file.h"
+
+struct cavity_yaml {
+    int shape;
+    double centre_m[2];
+    double radius_m;
+    double orientation_deg;
+};
+
+struct chamber_yaml {
+    struct cavity_yaml *cavities;
+    unsigned cavities_count;
+};
+
+struct caps_yaml {
+    double proximal_m;
+    double distal_m;
+};
+
+struct limits_yaml {
+    double working_pressure_pa;
+    double burst_pressure_pa;
+    double bend_deg;
+};
+
+struct module_yaml {
+    char *name;
+    char *source;
+    double outer_diameter_m;
+    double length_m;
+    struct caps_yaml end_caps;
+    double end_correction_m;
+    char *material;
+    struct chamber_yaml *chambers;
+    unsigned chambers_count;
+    struct limits_yaml limits;
+};
+
+static const cyaml_strval_t shapes[] = {{"circle", CAVITY_CIRCLE}, {"semicircle", CAVITY_SEMICIRCLE}};
+static const cyaml_schema_value_t coordinate = {CYAML_VALUE_FLOAT(CYAML_FLAG_DEFAULT, double)};
+static const cyaml_schema_field_t cavity_fields[] = {
+    CYAML_FIELD_ENUM("shape", CYAML_FLAG_STRICT, struct cavity_yaml, shape, shapes, 2),
+    CYAML_FIELD_SEQUENCE_FIXED("centre_m", CYAML_FLAG_DEFAULT, struct cavity_yaml, centre_m, &coordinate, 2),
+    CYAML_FIELD_FLOAT("radius_m", CYAML_FLAG_DEFAULT, struct cavity_yaml, radius_m),
+    CYAML_FIELD_FLOAT("orientation_deg", CYAML_FLAG_OPTIONAL, struct cavity_yaml, orientation_deg),
+    CYAML_FIELD_END};
+static const cyaml_schema_value_t cavity_schema = {
+    CYAML_VALUE_MAPPING(CYAML_FLAG_DEFAULT, struct cavity_yaml, cavity_fields)};
+static const cyaml_schema_field_t chamber_fields[] = {
+    CYAML_FIELD_SEQUENCE("cavities", CYAML_FLAG_POINTER, struct chamber_yaml, cavities, &cavity_schema, 1,
+                         MODULE_CAVITIES_MAX),
+    CYAML_FIELD_END};
+static const cyaml_schema_value_t chamber_schema = {
+    CYAML_VALUE_MAPPING(CYAML_FLAG_DEFAULT, struct chamber_yaml, chamber_fields)};
+static const cyaml_schema_field_t caps_fields[] = {
+    CYAML_FIELD_FLOAT("proximal_m", CYAML_FLAG_DEFAULT, struct caps_yaml, proximal_m),
+    CYAML_FIELD_FLOAT("distal_m", CYAML_FLAG_DEFAULT, struct caps_yaml, distal_m), CYAML_FIELD_END};
+static const cyaml_schema_field_t limits_fields[] = {
+    CYAML_FIELD_FLOAT("working_pressure_pa", CYAML_FLAG_DEFAULT, struct limits_yaml, working_pressure_pa),
+    CYAML_FIELD_FLOAT("burst_pressure_pa", CYAML_FLAG_DEFAULT, struct limits_yaml, burst_pressure_pa),
+    CYAML_FIELD_FLOAT("bend_deg", CYAML_FLAG_DEFAULT, struct limits_yaml, bend_deg), CYAML_FIELD_END};
+static const cyaml_schema_field_t module_fields[] = {
+    CYAML_FIELD_STRING_PTR("name", CYAML_FLAG_POINTER, struct module_yaml, name, 1, MODULE_NAME_BYTES - 1),
+    CYAML_FIELD_STRING_PTR("source", CYAML_FLAG_POINTER, struct module_yaml, source, 1, 511),
+    CYAML_FIELD_FLOAT("outer_diameter_m", CYAML_FLAG_DEFAULT, struct module_yaml, outer_diameter_m),
+    CYAML_FIELD_FLOAT("length_m", CYAML_FLAG_DEFAULT, struct module_yaml, length_m),
+    CYAML_FIELD_MAPPING("end_caps", CYAML_FLAG_DEFAULT, struct module_yaml, end_caps, caps_fields),
+    CYAML_FIELD_FLOAT("end_correction_m", CYAML_FLAG_OPTIONAL, struct module_yaml, end_correction_m),
+    CYAML_FIELD_STRING_PTR("material", CYAML_FLAG_POINTER, struct module_yaml, material, 1, MATERIAL_NAME_BYTES - 1),
+    CYAML_FIELD_SEQUENCE("chambers", CYAML_FLAG_POINTER, struct module_yaml, chambers, &chamber_schema, 1,
+                         MODULE_CHAMBERS),
+    CYAML_FIELD_MAPPING("limits", CYAML_FLAG_DEFAULT, struct module_yaml, limits, limits_fields),
+    CYAML_FIELD_END};
+static const cyaml_schema_value_t schema = {CYAML_VALUE_MAPPING(CYAML_FLAG_POINTER, struct module_yaml, module_fields)};
+
+struct positive {
+    const char *key;
+    double value;
+};
+
+static bool check_positive(const char *path, const struct module_yaml *yaml, struct description_error *error) {
+    const struct positive values[] = {{"outer_diameter_m", yaml->outer_diameter_m},
+                                      {"length_m", yaml->length_m},
+                                      {"working_pressure_pa", yaml->limits.working_pressure_pa},
+                                      {"burst_pressure_pa", yaml->limits.burst_pressure_pa},
+                                      {"bend_deg", yaml->limits.bend_deg}};
+    for (size_t i = 0; i < sizeof values / sizeof values[0]; i++) {
+        if (!(values[i].value > 0.0) || !isfinite(values[i].value)) {
+            return yaml_file_reject(error, path, values[i].key, 1, "must be a number above zero, not %g",
+                                    values[i].value);
+        }
+    }
+    int occurrence = 0;
+    for (unsigned c = 0; c < yaml->chambers_count; c++) {
+        for (unsigned k = 0; k < yaml->chambers[c].cavities_count; k++) {
+            const struct cavity_yaml *cavity = &yaml->chambers[c].cavities[k];
+            occurrence++;
+            if (!(cavity->radius_m > 0.0) || !isfinite(cavity->radius_m)) {
+                return yaml_file_reject(error, path, "radius_m", occurrence,
+                                        "the radius of a cavity must be above zero, not %g", cavity->radius_m);
+            }
+            if (!isfinite(cavity->centre_m[0]) || !isfinite(cavity->centre_m[1])) {
+                return yaml_file_reject(error, path, "centre_m", occurrence, "must be two finite numbers");
+            }
+        }
+    }
+    return true;
+}
+
+static bool check_relations(const char *path, const struct module_yaml *yaml, struct description_error *error) {
+    if (yaml->chambers_count == 2) {
+        return yaml_file_reject(error, path, "chambers", 1,
+                                "give one chamber (the others are its copies at 120 and 240 degrees) or all three");
+    }
+    if (yaml->end_caps.proximal_m < 0.0 || yaml->end_caps.distal_m < 0.0 ||
+        !(yaml->end_caps.proximal_m + yaml->end_caps.distal_m < yaml->length_m)) {
+        return yaml_file_reject(error, path, "end_caps", 1,
+                                "caps of %g and %g m leave no chamber in a module of %g m", yaml->end_caps.proximal_m,
+                                yaml->end_caps.distal_m, yaml->length_m);
+    }
+    const double chamber_m = yaml->length_m - yaml->end_caps.proximal_m - yaml->end_caps.distal_m;
+    if (!(fabs(yaml->end_correction_m) < 0.5 * chamber_m)) {
+        return yaml_file_reject(error, path, "end_correction_m", 1, "%g m is over half the chamber's length",
+                                yaml->end_correction_m);
+    }
+    if (!(yaml->limits.burst_pressure_pa > yaml->limits.working_pressure_pa)) {
+        return yaml_file_reject(error, path, "burst_pressure_pa", 1,
+                                "must be above the working pressure of %g Pa, not %g", yaml->limits.working_pressure_pa,
+                                yaml->limits.burst_pressure_pa);
+    }
+    if (!(yaml->limits.bend_deg <= 170.0)) {
+        return yaml_file_reject(error, path, "bend_deg", 1, "over 170 degrees the tip meets the base");
+    }
+    return true;
+}
+
+static void turn_cavity(const struct cavity *from, double angle_rad, struct cavity *to) {
+    *to = *from;
+    to->centre_m[0] = from->centre_m[0] * cos(angle_rad) - from->centre_m[1] * sin(angle_rad);
+    to->centre_m[1] = from->centre_m[0] * sin(angle_rad) + from->centre_m[1] * cos(angle_rad);
+    to->orientation_rad = from->orientation_rad + angle_rad;
+}
+
+static void take(const struct module_yaml *yaml, struct module_description *module) {
+    memset(module, 0, sizeof *module);
+    (void)snprintf(module->name, sizeof module->name, "%s", yaml->name);
+    module->outer_diameter_m = yaml->outer_diameter_m;
+    module->length_m = yaml->length_m;
+    module->cap_proximal_m = yaml->end_caps.proximal_m;
+    module->cap_distal_m = yaml->end_caps.distal_m;
+    module->chamber_length_m = yaml->length_m - yaml->end_caps.proximal_m - yaml->end_caps.distal_m;
+    module->end_correction_m = yaml->end_correction_m;
+    module->working_pressure_pa = yaml->limits.working_pressure_pa;
+    module->burst_pressure_pa = yaml->limits.burst_pressure_pa;
+    module->bend_limit_rad = yaml->limits.bend_deg * M_PI / 180.0;
+    module->three_fold = yaml->chambers_count == 1;
+    for (size_t c = 0; c < MODULE_CHAMBERS; c++) {
+        const struct chamber_yaml *chamber = &yaml->chambers[module->three_fold ? 0 : c];
+        module->chamber[c].cavity_count = chamber->cavities_count;
+        for (size_t k = 0; k < chamber->cavities_count; k++) {
+            const struct cavity_yaml *from = &chamber->cavities[k];
+            const struct cavity cavity = {(enum cavity_shape)from->shape,
+                                          {from->centre_m[0], from->centre_m[1]},
+                                          from->radius_m,
+                                          from->orientation_deg * M_PI / 180.0};
+            turn_cavity(&cavity, module->three_fold ? (double)c * 2.0 * M_PI / 3.0 : 0.0,
+                        &module->chamber[c].cavity[k]);
+        }
+    }
+}
+
+static bool check_section(const char *path, const struct module_description *module, struct description_error *error) {
+    size_t first = 0, second = 0;
+    switch (module_check_section(module, &first, &second)) {
+    case MODULE_CAVITY_LEAVES:
+        return yaml_file_reject(error, path, "chambers", 1,
+                                "a cavity of chamber %zu leaves the module (or a wall under %g mm): move it inwards or "
+                                "make it smaller",
+                                first + 1, 1e3 * MODULE_WALL_LEAST_M);
+    case MODULE_CAVITIES_OVERLAP:
+        return yaml_file_reject(error, path, "chambers", 1,
+                                "cavities of chambers %zu and %zu overlap (or their wall is under %g mm): move them "
+                                "apart or make them smaller",
+                                first + 1, second + 1, 1e3 * MODULE_WALL_LEAST_M);
+    case MODULE_CENTRE_HOLLOW:
+        return yaml_file_reject(error, path, "chambers", 1,
+                                "a cavity of chamber %zu covers the section's centre, which must be solid", first + 1);
+    default:
+        return true;
+    }
+}
+
+static bool read_material(const char *path, const char *name, struct module_description *module,
+                          struct description_error *error) {
+    char copy[PATH_MAX], file[PATH_MAX];
+    const size_t length = strlen(name);
+    if (strchr(name, '/') != NULL || (length > 5 && strcmp(name + length - 5, ".yaml") == 0)) {
+        return material_read(name, &module->material, error);
+    }
+    (void)snprintf(copy, sizeof copy, "%s", path);
+    const int written = snprintf(file, sizeof file, "%s/../materials/%s.yaml", dirname(copy), name);
+    if (written < 0 || (size_t)written >= sizeof file) {
+        return yaml_file_reject(error, path, "material", 1, "the path to '%s' is too long", name);
+    }
+    return material_read(file, &module->material, error);
+}
+
+bool module_description_read(const char *path, const char *material_name, struct module_description *module,
+                             struct description_error *error) {
+    struct module_yaml *yaml = NULL;
+    if (!yaml_file_load(path, &schema, (void **)&yaml, error)) {
+        return false;
+    }
+    bool sound = check_positive(path, yaml, error) && check_relations(path, yaml, error);
+    if (sound) {
+        take(yaml, module);
+        sound = check_section(path, module, error) &&
+                read_material(path, material_name != NULL ? material_name : yaml->material, module, error);
+    }
+    if (sound) {
+        (void)snprintf(module->material_name, sizeof module->material_name, "%s", module->material.name);
+    }
+    cyaml_free(&yaml_config, &schema, yaml, 0);
+    return sound;
+}
+
+/* FNV-1a 64 (Fowler, Noll, Vo). */
+static unsigned long long hash_bytes(unsigned long long hash, const void *bytes, size_t size) {
+    const unsigned char *byte = bytes;
+    for (size_t i = 0; i < size; i++) {
+        hash = (hash ^ byte[i]) * 1099511628211ULL;
+    }
+    return hash;
+}
+
+static unsigned long long hash_number(unsigned long long hash, double value) {
+    return hash_bytes(hash, &value, sizeof value);
+}
+
+unsigned long long module_description_hash(const struct module_description *module) {
+    unsigned long long hash = 14695981039346656037ULL;
+    hash = hash_bytes(hash, module->name, strlen(module->name));
+    const double numbers[] = {module->outer_diameter_m, module->length_m,          module->chamber_length_m,
+                              module->end_correction_m, module->cap_proximal_m,    module->cap_distal_m,
+                              module->working_pressure_pa, module->burst_pressure_pa, module->bend_limit_rad,
+                              module->material.bulk_modulus_pa};
+    for (size_t i = 0; i < sizeof numbers / sizeof numbers[0]; i++) {
+        hash = hash_number(hash, numbers[i]);
+    }
+    for (size_t i = 0; i < module->material.terms; i++) {
+        hash = hash_number(hash, module->material.coefficient_pa[i]);
+    }
+    for (size_t c = 0; c < MODULE_CHAMBERS; c++) {
+        for (size_t k = 0; k < module->chamber[c].cavity_count; k++) {
+            const struct cavity *cavity = &module->chamber[c].cavity[k];
+            const double values[] = {(double)cavity->shape, cavity->centre_m[0], cavity->centre_m[1], cavity->radius_m,
+                                     cavity->orientation_rad};
+            for (size_t i = 0; i < sizeof values / sizeof values[0]; i++) {
+                hash = hash_number(hash, values[i]);
+            }
+        }
+    }
+    return hash;
+}
