@@ -142,7 +142,7 @@ static bool land_on_goal(struct path *path, double low_value, double arc, double
 static bool follow(struct path *path, double goal_value, section_path_callback callback, void *context,
                    struct description_error *error) {
     struct section_solver *solver = path->solver;
-    double arc = ARC_FIRST, last = 0.0;
+    double arc = ARC_FIRST, last = 0.0, greatest_factor = 0.0;
     struct section_state state;
     for (int point = 0; point < PATH_POINTS_MAX; point++) {
         while (!step_along(path, arc)) {
@@ -175,6 +175,14 @@ static bool follow(struct path *path, double goal_value, section_path_callback c
         }
         last = value;
         accept(path);
+        greatest_factor = fmax(greatest_factor, path->factor);
+        if (path->factor < 0.0) {
+            (void)snprintf(error->text, sizeof error->text,
+                           "the pressure turns back at a limit point of %.0f Pa and falls to zero: beyond it there is no "
+                           "equilibrium (the material has lost its stability)",
+                           greatest_factor * solver->modulus_pa);
+            return false;
+        }
         arc = fmin(ARC_MOST, arc * (path->iterations < ARC_ITERATIONS_WANTED ? 1.4 : 0.8));
     }
     (void)snprintf(error->text, sizeof error->text, "the goal was not reached in %d path points", PATH_POINTS_MAX);

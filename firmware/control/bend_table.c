@@ -1,0 +1,312 @@
+#include "control/bend_table.h"
+
+#include <string.h>
+
+#include "control/bend_table_format.h"
+
+#define AXIS_NODES_LEAST 4u
+#define STENCIL 4u
+
+_Static_assert(__BYTE_ORDER__ == __ORDER_LITTLE_ENDIAN__, "the image is read in place, in little-endian byte order");
+
+/* --- opening --- */
+
+uint32_t bend_table_crc32(uint32_t crc, const void *bytes, size_t size) {
+    static const uint32_t half_byte[16] = {0x00000000u, 0x1db71064u, 0x3b6e20c8u, 0x26d930acu, 0x76dc4190u, 0x6b6b51f4u,
+                                           0x4db26158u, 0x5005713cu, 0xedb88320u, 0xf00f9344u, 0xd6d6a3e8u, 0xcb61b38cu,
+                                           0x9b64c2b0u, 0x86d3d2d4u, 0xa00ae278u, 0xbdbdf21cu};
+    const uint8_t *byte = bytes;
+    crc = ~crc;
+    for (size_t i = 0; i < size; i++) {
+        crc ^= byte[i];
+        crc = (crc >> 4) ^ half_byte[crc & 15u];
+        crc = (crc >> 4) ^ half_byte[crc & 15u];
+    }
+    return ~crc;
+}
+
+static uint32_t read_u32(const uint8_t *image, size_t offset) {
+    uint32_t value = 0;
+    (void)memcpy(&value, image + offset, sizeof value);
+    return value;
+}
+
+static uint16_t read_u16(const uint8_t *image, size_t offset) {
+    uint16_t value = 0;
+    (void)memcpy(&value, image + offset, sizeof value);
+    return value;
+}
+
+static bool is_finite(float value) {
+    return value - value == 0.0f;
+}
+
+static enum bend_table_status check_frame(const uint8_t *image, size_t size) {
+    if (size < BEND_TABLE_HEADER_BYTES) {
+        return BEND_TABLE_TOO_SHORT;
+    }
+    if (memcmp(image, BEND_TABLE_MAGIC, 4) != 0) {
+        return BEND_TABLE_BAD_MAGIC;
+    }
+    if (read_u16(image, BEND_TABLE_OFFSET_VERSION) != BEND_TABLE_VERSION) {
+        return BEND_TABLE_BAD_VERSION;
+    }
+    const uint32_t image_bytes = read_u32(image, BEND_TABLE_OFFSET_IMAGE_BYTES);
+    if (size < image_bytes) {
+        return BEND_TABLE_TOO_SHORT;
+    }
+    if (size > image_bytes || read_u16(image, BEND_TABLE_OFFSET_HEADER_BYTES) != BEND_TABLE_HEADER_BYTES) {
+        return BEND_TABLE_BAD_SIZE;
+    }
+    const size_t covered = BEND_TABLE_OFFSET_CRC + 4u;
+    if (bend_table_crc32(0u, image + covered, size - covered) != read_u32(image, BEND_TABLE_OFFSET_CRC)) {
+        return BEND_TABLE_BAD_CRC;
+    }
+    return BEND_TABLE_OK;
+}
+
+static enum bend_table_status bind_arrays(struct bend_table *table, const uint8_t *image, size_t size) {
+    size_t nodes = 1, axis_nodes = 0;
+    for (size_t a = 0; a < 3; a++) {
+        table->nodes[a] = read_u32(image, BEND_TABLE_OFFSET_NODES + 4u * a);
+        if (table->nodes[a] < AXIS_NODES_LEAST || table->nodes[a] > BEND_TABLE_AXIS_NODES_MAX) {
+            return BEND_TABLE_BAD_AXIS;
+        }
+        nodes *= table->nodes[a];
+        axis_nodes += table->nodes[a];
+    }
+    const size_t used =
+        BEND_TABLE_HEADER_BYTES + sizeof(float) * (axis_nodes + BEND_TABLE_CHANNEL_COUNT * nodes) + nodes;
+    if (read_u32(image, BEND_TABLE_OFFSET_CHANNELS) != BEND_TABLE_CHANNEL_COUNT || size != (used + 3u) / 4u * 4u) {
+        return BEND_TABLE_BAD_SIZE;
+    }
+    const float *next = (const float *)(const void *)(image + BEND_TABLE_HEADER_BYTES);
+    for (size_t a = 0; a < 3; a++) {
+        table->axis_pa[a] = next;
+        next += table->nodes[a];
+    }
+    for (size_t c = 0; c < BEND_TABLE_CHANNEL_COUNT; c++) {
+        table->channel[c] = next;
+        for (size_t i = 0; i < nodes; i++) {
+            if (!is_finite(next[i])) {
+                return BEND_TABLE_BAD_VALUE;
+            }
+        }
+        next += nodes;
+    }
+    table->tag = (const uint8_t *)(const void *)next;
+    return BEND_TABLE_OK;
+}
+
+static enum bend_table_status read_module(struct bend_table *table, const uint8_t *image) {
+    struct bend_table_module *module = &table->module;
+    float geometry[8];
+    (void)memcpy(module->name, image + BEND_TABLE_OFFSET_NAME, BEND_TABLE_NAME_BYTES);
+    (void)memcpy(&module->inputs_hash, image + BEND_TABLE_OFFSET_HASH, sizeof module->inputs_hash);
+    (void)memcpy(geometry, image + BEND_TABLE_OFFSET_GEOMETRY, sizeof geometry);
+    module->outer_diameter_m = geometry[0];
+    module->chamber_length_m = geometry[1];
+    module->active_length_m = geometry[2];
+    module->cap_proximal_m = geometry[3];
+    module->cap_distal_m = geometry[4];
+    module->working_pressure_pa = geometry[5];
+    module->burst_pressure_pa = geometry[6];
+    module->bend_limit_rad = geometry[7];
+    bool sound = module->name[BEND_TABLE_NAME_BYTES - 1u] == '\0';
+    for (size_t i = 0; i < 8; i++) {
+        const bool may_be_zero = i == 3 || i == 4;
+        sound = sound && is_finite(geometry[i]) && (geometry[i] > 0.0f || (may_be_zero && geometry[i] == 0.0f));
+    }
+    sound = sound && module->burst_pressure_pa > module->working_pressure_pa;
+    return sound ? BEND_TABLE_OK : BEND_TABLE_BAD_VALUE;
+}
+
+/* Three-point difference weights on an uneven axis (Fornberg 1988), the nearest three nodes at the ends. */
+static enum bend_table_status weigh_slopes(struct bend_table *table, size_t a) {
+    const float *x = table->axis_pa[a];
+    const size_t n = table->nodes[a];
+    if (x[0] != 0.0f) {
+        return BEND_TABLE_BAD_AXIS;
+    }
+    for (size_t i = 0; i + 1 < n; i++) {
+        if (!is_finite(x[i + 1]) || !(x[i + 1] > x[i])) {
+            return BEND_TABLE_BAD_AXIS;
+        }
+    }
+    for (size_t i = 0; i < n; i++) {
+        const size_t j = i == 0 ? 0 : (i - 1 > n - 3 ? n - 3 : i - 1);
+        for (size_t k = 0; k < 3; k++) {
+            const float own = x[j + k], one = x[j + (k + 1) % 3], two = x[j + (k + 2) % 3];
+            table->slope[a][i][k] = ((x[i] - one) + (x[i] - two)) / ((own - one) * (own - two));
+        }
+    }
+    return BEND_TABLE_OK;
+}
+
+enum bend_table_status bend_table_open(struct bend_table *table, const void *image, size_t size,
+                                       const char *module_name) {
+    (void)memset(table, 0, sizeof *table);
+    if (image == NULL) {
+        return BEND_TABLE_TOO_SHORT;
+    }
+    if ((uintptr_t)image % sizeof(float) != 0u) {
+        return BEND_TABLE_MISALIGNED;
+    }
+    enum bend_table_status status = check_frame(image, size);
+    if (status == BEND_TABLE_OK) {
+        status = read_module(table, image);
+    }
+    if (status == BEND_TABLE_OK) {
+        status = bind_arrays(table, image, size);
+    }
+    for (size_t a = 0; a < 3 && status == BEND_TABLE_OK; a++) {
+        status = weigh_slopes(table, a);
+    }
+    if (status == BEND_TABLE_OK && module_name != NULL &&
+        strncmp(module_name, table->module.name, BEND_TABLE_NAME_BYTES) != 0) {
+        status = BEND_TABLE_WRONG_MODULE;
+    }
+    return status;
+}
+
+const char *bend_table_status_text(enum bend_table_status status) {
+    switch (status) {
+    case BEND_TABLE_OK:
+        return "the table is sound";
+    case BEND_TABLE_TOO_SHORT:
+        return "the table is cut short; copy or build it again";
+    case BEND_TABLE_BAD_MAGIC:
+        return "this is not a bend table (it does not start with TBND)";
+    case BEND_TABLE_BAD_VERSION:
+        return "the table is of another version of the format; build it again";
+    case BEND_TABLE_BAD_SIZE:
+        return "the table's size does not fit its header; copy or build it again";
+    case BEND_TABLE_BAD_CRC:
+        return "the table was changed after it was built (CRC-32 differs); copy or build it again";
+    case BEND_TABLE_BAD_AXIS:
+        return "a pressure axis of the table does not rise from zero over 4 to 32 nodes";
+    case BEND_TABLE_BAD_VALUE:
+        return "the table holds a number that is not finite or a geometry that makes no sense";
+    case BEND_TABLE_WRONG_MODULE:
+        return "the table is of another module";
+    case BEND_TABLE_MISALIGNED:
+        return "the table does not start at a multiple of four bytes";
+    default:
+        return "unknown table status";
+    }
+}
+
+/* --- interpolation --- */
+
+static size_t find_cell(const float *axis, size_t nodes, float pressure_pa) {
+    size_t low = 0, high = nodes - 1;
+    while (high - low > 1) { /* at most five rounds: axes have up to 32 nodes */
+        const size_t middle = (low + high) / 2;
+        if (axis[middle] <= pressure_pa) {
+            low = middle;
+        } else {
+            high = middle;
+        }
+    }
+    return low;
+}
+
+static void locate_on_axis(const struct bend_table *table, size_t a, float pressure_pa,
+                           struct bend_table_stencil *stencil) {
+    const float *axis = table->axis_pa[a];
+    const size_t n = table->nodes[a];
+    float p = pressure_pa >= axis[0] ? pressure_pa : axis[0]; /* NaN goes to the start */
+    p = p <= axis[n - 1] ? p : axis[n - 1];
+    const bool clamped = !(p == pressure_pa);
+    const size_t cell = find_cell(axis, n, p);
+    const size_t first = cell == 0 ? 0 : (cell - 1 > n - STENCIL ? n - STENCIL : cell - 1);
+    const float h = axis[cell + 1] - axis[cell], t = (p - axis[cell]) / h;
+    /* cubic Hermite basis: value and slope at either end, and its derivative by p */
+    const float basis[4] = {(1.0f + 2.0f * t) * (1.0f - t) * (1.0f - t), t * (1.0f - t) * (1.0f - t) * h,
+                            t * t * (3.0f - 2.0f * t), t * t * (t - 1.0f) * h};
+    const float rate[4] = {6.0f * t * (t - 1.0f) / h, (1.0f - t) * (1.0f - 3.0f * t), 6.0f * t * (1.0f - t) / h,
+                           t * (3.0f * t - 2.0f)};
+    float weight[STENCIL] = {0.0f, 0.0f, 0.0f, 0.0f}, derivative[STENCIL] = {0.0f, 0.0f, 0.0f, 0.0f};
+    for (size_t end = 0; end < 2; end++) {
+        const size_t node = cell + end;
+        const size_t j = node == 0 ? 0 : (node - 1 > n - 3 ? n - 3 : node - 1);
+        weight[node - first] += basis[2 * end];
+        derivative[node - first] += rate[2 * end];
+        for (size_t k = 0; k < 3; k++) {
+            weight[j - first + k] += basis[2 * end + 1] * table->slope[a][node][k];
+            derivative[j - first + k] += rate[2 * end + 1] * table->slope[a][node][k];
+        }
+    }
+    stencil->first[a] = (uint32_t)first;
+    stencil->cell[a] = (uint32_t)cell;
+    stencil->clamped = stencil->clamped || clamped;
+    for (size_t k = 0; k < STENCIL; k++) {
+        stencil->weight[a][k] = weight[k];
+        stencil->derivative[a][k] = clamped ? 0.0f : derivative[k];
+    }
+}
+
+void bend_table_locate(const struct bend_table *table, const float pressure_pa[3], struct bend_table_stencil *stencil) {
+    stencil->clamped = false;
+    for (size_t a = 0; a < 3; a++) {
+        locate_on_axis(table, a, pressure_pa[a], stencil);
+    }
+}
+
+static const float *stencil_start(const struct bend_table *table, const struct bend_table_stencil *stencil,
+                                  enum bend_table_channel channel) {
+    return table->channel[channel] + stencil->first[2] +
+           table->nodes[2] * (stencil->first[1] + table->nodes[1] * (size_t)stencil->first[0]);
+}
+
+float bend_table_value(const struct bend_table *table, const struct bend_table_stencil *stencil,
+                       enum bend_table_channel channel) {
+    const float *start = stencil_start(table, stencil, channel);
+    const float *w3 = stencil->weight[2];
+    float sum = 0.0f;
+    for (size_t i = 0; i < STENCIL; i++) {
+        float plane = 0.0f;
+        for (size_t j = 0; j < STENCIL; j++) {
+            const float *row = start + table->nodes[2] * (j + table->nodes[1] * i);
+            plane += stencil->weight[1][j] * (w3[0] * row[0] + w3[1] * row[1] + w3[2] * row[2] + w3[3] * row[3]);
+        }
+        sum += stencil->weight[0][i] * plane;
+    }
+    return sum;
+}
+
+float bend_table_gradient(const struct bend_table *table, const struct bend_table_stencil *stencil,
+                          enum bend_table_channel channel, float gradient[3]) {
+    const float *start = stencil_start(table, stencil, channel);
+    const float *w3 = stencil->weight[2], *d3 = stencil->derivative[2];
+    float value = 0.0f;
+    gradient[0] = 0.0f;
+    gradient[1] = 0.0f;
+    gradient[2] = 0.0f;
+    for (size_t i = 0; i < STENCIL; i++) {
+        float plane = 0.0f, plane2 = 0.0f, plane3 = 0.0f;
+        for (size_t j = 0; j < STENCIL; j++) {
+            const float *row = start + table->nodes[2] * (j + table->nodes[1] * i);
+            const float line = w3[0] * row[0] + w3[1] * row[1] + w3[2] * row[2] + w3[3] * row[3];
+            plane += stencil->weight[1][j] * line;
+            plane2 += stencil->derivative[1][j] * line;
+            plane3 += stencil->weight[1][j] * (d3[0] * row[0] + d3[1] * row[1] + d3[2] * row[2] + d3[3] * row[3]);
+        }
+        value += stencil->weight[0][i] * plane;
+        gradient[0] += stencil->derivative[0][i] * plane;
+        gradient[1] += stencil->weight[0][i] * plane2;
+        gradient[2] += stencil->weight[0][i] * plane3;
+    }
+    return value;
+}
+
+bool bend_table_is_valid(const struct bend_table *table, const struct bend_table_stencil *stencil) {
+    bool valid = !stencil->clamped;
+    for (size_t corner = 0; corner < 8; corner++) {
+        const size_t i = stencil->cell[0] + (corner & 1u), j = stencil->cell[1] + ((corner >> 1) & 1u);
+        const size_t k = stencil->cell[2] + (corner >> 2);
+        const size_t at = k + table->nodes[2] * (j + table->nodes[1] * i);
+        valid = valid && (table->tag[at] & (unsigned)BEND_TABLE_TAG_VALID) != 0u;
+    }
+    return valid;
+}

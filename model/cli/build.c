@@ -1,0 +1,134 @@
+/* tribend-tables build: a module's bend table, with a progress bar. */
+#include <argp.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <time.h>
+#include <unistd.h>
+
+#include "cli/cli.h"
+#include "table/table_builder.h"
+#include "units/units.h"
+
+#define BAR_WIDTH 40
+
+struct arguments {
+    const char *module;
+    const char *material;
+    const char *output;
+    struct table_build_options build;
+    bool quiet;
+};
+
+static const struct argp_option options[] = {
+    {"output", 'o', "FILE", 0, "the table to write (default MODULE.tbt)", 0},
+    {"material", 'm', "NAME", 0, "a material from tables/materials, or the path of a YAML file", 0},
+    {"nodes", 'n', "COUNT", 0, "nodes on each pressure axis, 4 to 32 (default 17)", 0},
+    {"mesh-size", 's', "LENGTH", 0, "element size at chamber walls (default 0.75mm)", 0},
+    {"quiet", 'q', NULL, 0, "no progress", 0},
+    {0}};
+
+static error_t parse(int key, char *argument, struct argp_state *state) {
+    struct arguments *arguments = state->input;
+    char error[CLI_ERROR_BYTES], *end = NULL;
+    switch (key) {
+    case 'o':
+        arguments->output = argument;
+        return 0;
+    case 'm':
+        arguments->material = argument;
+        return 0;
+    case 'n':
+        arguments->build.nodes = strtoul(argument, &end, 10);
+        if (end == argument || *end != '\0' || arguments->build.nodes < 4 || arguments->build.nodes > 32) {
+            argp_error(state, "--nodes: '%s' is not a number from 4 to 32", argument);
+        }
+        return 0;
+    case 's':
+        if (!units_parse(UNITS_LENGTH, argument, &arguments->build.size_m, error, sizeof error)) {
+            argp_error(state, "--mesh-size: %s", error);
+        } else if (!(arguments->build.size_m >= 1e-4)) {
+            argp_error(state, "--mesh-size: %s is under 0.1mm", argument);
+        }
+        return 0;
+    case 'q':
+        arguments->quiet = true;
+        return 0;
+    case ARGP_KEY_ARG:
+        if (state->arg_num > 0) {
+            argp_error(state, "one module at a time, '%s' is too much", argument);
+        }
+        arguments->module = argument;
+        return 0;
+    case ARGP_KEY_NO_ARGS:
+        argp_error(state, "which MODULE? For example paper-semicircle");
+        return 0;
+    default:
+        return ARGP_ERR_UNKNOWN;
+    }
+}
+
+static const struct argp parser = {options, parse, "MODULE",
+                                   "Build the bend table of MODULE (a name from tables/modules or a YAML file).",
+                                   NULL, NULL, NULL};
+
+/* A bar that redraws itself on a terminal, a line for each tenth elsewhere. */
+static void show_progress(void *context, size_t done, size_t total) {
+    const bool terminal = *(const bool *)context;
+    if (terminal) {
+        const int filled = (int)(done * BAR_WIDTH / total);
+        fprintf(stderr, "\r[%.*s%*s] %3zu %% (%zu of %zu equilibria)", filled,
+                "########################################", BAR_WIDTH - filled, "", 100 * done / total, done, total);
+        if (done == total) {
+            fputc('\n', stderr);
+        }
+    } else if (done * 10 / total != (done - 1) * 10 / total) {
+        fprintf(stderr, "%3zu %% (%zu of %zu equilibria)\n", 100 * done / total, done, total);
+    }
+}
+
+static double seconds(void) {
+    struct timespec now;
+    (void)clock_gettime(CLOCK_MONOTONIC, &now);
+    return (double)now.tv_sec + 1e-9 * (double)now.tv_nsec;
+}
+
+static int run(struct arguments *arguments) {
+    char path[CLI_PATH_BYTES], message[CLI_ERROR_BYTES], output[CLI_PATH_BYTES];
+    struct module_description module;
+    struct description_error error;
+    struct table_image image;
+    bool terminal = isatty(STDERR_FILENO) != 0;
+    cli_module_path(arguments->module, path);
+    if (!module_description_read(path, arguments->material, &module, &error)) {
+        return cli_fail(EXIT_BAD_INPUT, "%s", error.text);
+    }
+    (void)snprintf(output, sizeof output, "%s%s", arguments->output != NULL ? arguments->output : module.name,
+                   arguments->output != NULL ? "" : ".tbt");
+    cli_print_material(&module.material);
+    (void)fflush(stdout);
+    cli_catch_interrupt();
+    arguments->build.stop = &cli_interrupted;
+    arguments->build.progress = arguments->quiet ? NULL : show_progress;
+    arguments->build.context = &terminal;
+    const double start_s = seconds();
+    if (!table_build(&module, &arguments->build, &image, &error)) {
+        return cli_fail(EXIT_SOLVER, "%s%s", terminal ? "\n" : "", error.text);
+    }
+    const bool written = table_image_write(&image, output, message, sizeof message);
+    if (written) {
+        printf("table     %s: %zu nodes from %zu equilibria (%zu without), %zu bytes, %.1f s\n", output, image.nodes,
+               image.solved, image.no_equilibrium, image.size, seconds() - start_s);
+    }
+    table_image_free(&image);
+    return written ? EXIT_OK : cli_fail(EXIT_OUTPUT, "%s", message);
+}
+
+int cli_build(int argc, char **argv) {
+    struct arguments arguments = {.module = NULL};
+    argp_err_exit_status = EXIT_USAGE;
+    if (argp_parse(&parser, argc, argv, 0, NULL, &arguments) != 0) {
+        return EXIT_USAGE;
+    }
+    return run(&arguments);
+}

@@ -1,0 +1,370 @@
+#include "table/table_builder.h"
+
+#include <math.h>
+#include <stdint.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <zlib.h>
+
+#include "control/bend_table.h"
+#include "control/bend_table_format.h"
+#include "output/output_file.h"
+#include "section/section_solver.h"
+
+_Static_assert(__BYTE_ORDER__ == __ORDER_LITTLE_ENDIAN__, "the image is written in the host's byte order");
+
+/* The axis reaches past the working pressure, so that control and simulation never leave it in normal use. */
+#define AXIS_MARGIN 1.1
+/* p_i = p_max (i / (n - 1))^exponent: closer nodes at high pressure, where bend rises fastest. */
+#define AXIS_EXPONENT 0.65
+
+struct node {
+    float value[BEND_TABLE_CHANNEL_COUNT];
+    uint8_t tag; /* 0: not solved (no equilibrium) */
+};
+
+struct build {
+    const struct module_description *module;
+    const struct table_build_options *options;
+    size_t n;
+    double axis_pa[BEND_TABLE_AXIS_NODES_MAX];
+    struct node *node; /* [n * n * n], filled where i1 >= i2 >= i3 */
+    double *base;      /* [n * unknowns] states with chamber 1 alone */
+    size_t base_count; /* of them with an equilibrium */
+    size_t unknowns;
+    size_t done;
+    size_t total;
+    size_t newton_iterations;
+    size_t no_equilibrium;
+    bool failed;
+};
+
+static struct node *node_at(const struct build *build, size_t i, size_t j, size_t k) {
+    return &build->node[k + build->n * (j + build->n * i)];
+}
+
+static bool stopped(const struct build *build) {
+    return build->options->stop != NULL && *build->options->stop != 0;
+}
+
+static void record(struct node *node, const struct section_state *state) {
+    const double values[BEND_TABLE_CHANNEL_COUNT] = {
+        state->curvature_x_1pm, state->curvature_y_1pm, state->stretch,     state->volume_m2[0], state->volume_m2[1],
+        state->volume_m2[2],    state->von_mises_apex_pa, state->stretch_max, state->width_max_m};
+    for (size_t c = 0; c < BEND_TABLE_CHANNEL_COUNT; c++) {
+        node->value[c] = (float)values[c];
+    }
+    unsigned tag = BEND_TABLE_TAG_VALID | BEND_TABLE_TAG_STABLE;
+    tag |= state->beyond_strain ? BEND_TABLE_TAG_BEYOND_STRAIN : 0u;
+    if (state->contact) {
+        tag = (tag | BEND_TABLE_TAG_CONTACT) & ~(unsigned)BEND_TABLE_TAG_VALID;
+    }
+    node->tag = (uint8_t)tag;
+}
+
+/* Move to a node and record it; false where there is no equilibrium. */
+static bool solve_node(struct build *build, struct section_solver *solver, size_t i, size_t j, size_t k) {
+    const double pressure_pa[3] = {build->axis_pa[i], build->axis_pa[j], build->axis_pa[k]};
+    struct section_state state;
+    const bool found = section_solver_move_to(solver, pressure_pa);
+    section_solver_state(solver, &state);
+    if (found) {
+        record(node_at(build, i, j, k), &state);
+    }
+#pragma omp critical(table_progress)
+    {
+        build->done++;
+        build->newton_iterations += (size_t)state.newton_iterations;
+        build->no_equilibrium += !found;
+        if (build->options->progress != NULL) {
+            build->options->progress(build->options->context, build->done, build->total);
+        }
+    }
+    return found;
+}
+
+/* Chamber 1 alone, from nothing to the end of the axis: where each slab starts. */
+static void solve_base(struct build *build, struct section_solver *solver) {
+    section_solver_reset(solver);
+    for (size_t i = 0; i < build->n && !stopped(build); i++) {
+        if (!solve_node(build, solver, i, 0, 0)) {
+            return;
+        }
+        section_solver_save(solver, build->base + i * build->unknowns);
+        build->base_count = i + 1;
+    }
+}
+
+/* One slab: chamber 1 fixed, chamber 2 rising, and from each of its states chamber 3 rising up to chamber 2. */
+static void solve_slab(struct build *build, struct section_solver *solver, double *row, size_t i) {
+    memcpy(row, build->base + i * build->unknowns, build->unknowns * sizeof(double));
+    for (size_t j = 1; j <= i; j++) {
+        section_solver_restore(solver, row);
+        if (stopped(build) || !solve_node(build, solver, i, j, 0)) {
+            return;
+        }
+        section_solver_save(solver, row);
+        for (size_t k = 1; k <= j && !stopped(build); k++) {
+            if (!solve_node(build, solver, i, j, k)) {
+                break;
+            }
+        }
+    }
+}
+
+static void solve_all(struct build *build, const struct section_mesh *mesh, struct description_error *error) {
+#pragma omp parallel
+    {
+        struct description_error own = {""};
+        struct section_solver *solver = section_solver_create(mesh, build->module, &own);
+        double *row = NULL;
+#pragma omp single
+        {
+            if (solver != NULL) {
+                build->unknowns = section_solver_unknowns(solver);
+                build->base = malloc(build->n * build->unknowns * sizeof(double));
+                if (build->base != NULL) {
+                    solve_base(build, solver);
+                }
+            }
+        }
+        row = malloc((build->unknowns + 1) * sizeof(double));
+        if (solver == NULL || row == NULL || build->base == NULL) {
+#pragma omp critical(table_failure)
+            {
+                build->failed = true;
+                (void)snprintf(error->text, sizeof error->text, "%.256s",
+                               own.text[0] == '\0' ? "out of memory for the table" : own.text);
+            }
+        }
+#pragma omp barrier
+#pragma omp for schedule(dynamic, 1)
+        for (size_t back = 0; back < build->base_count; back++) {
+            if (!build->failed) { /* the largest slab first */
+                solve_slab(build, solver, row, build->base_count - 1 - back);
+            }
+        }
+        free(row);
+        section_solver_free(solver);
+    }
+}
+
+/* --- from one sixth to the whole --- */
+
+/* order[k]: the chamber with the k-th greatest index; ties keep their order. */
+static void sort_chambers(const size_t index[3], size_t order[3]) {
+    for (size_t c = 0; c < 3; c++) {
+        size_t rank = 0;
+        for (size_t d = 0; d < 3; d++) {
+            rank += index[d] > index[c] || (index[d] == index[c] && d < c);
+        }
+        order[rank] = c;
+    }
+}
+
+/* The solved node, moved so that the chamber with the k-th greatest pressure is order[k]: a turn by order[0] thirds,
+ * after a mirror at the x axis (chambers 2 and 3 change places) where the order runs backwards. */
+static void turn_node(const struct node *solved, const size_t order[3], struct node *turned) {
+    const bool mirrored = (order[1] + 3 - order[0]) % 3 == 2;
+    const double angle = (double)order[0] * 2.0 * M_PI / 3.0;
+    const double x = (double)solved->value[BEND_TABLE_CURVATURE_X];
+    const double y = (mirrored ? -1.0 : 1.0) * (double)solved->value[BEND_TABLE_CURVATURE_Y];
+    *turned = *solved;
+    turned->value[BEND_TABLE_CURVATURE_X] = (float)(x * cos(angle) - y * sin(angle));
+    turned->value[BEND_TABLE_CURVATURE_Y] = (float)(x * sin(angle) + y * cos(angle));
+    for (size_t k = 0; k < 3; k++) {
+        turned->value[BEND_TABLE_VOLUME_1 + order[k]] = solved->value[BEND_TABLE_VOLUME_1 + k];
+    }
+    if (mirrored || order[0] != 0) {
+        turned->tag = (uint8_t)(turned->tag | BEND_TABLE_TAG_MIRRORED);
+    }
+}
+
+/* A node without an equilibrium takes the values of the nearest one below it along the diagonal. */
+static struct node fill_node(const struct build *build, size_t i, size_t j, size_t k) {
+    while (node_at(build, i, j, k)->tag == 0 && i > 0) {
+        i -= 1;
+        j -= j > 0;
+        k -= k > 0;
+    }
+    struct node filled = *node_at(build, i, j, k);
+    filled.tag = BEND_TABLE_TAG_EXTRAPOLATED;
+    return filled;
+}
+
+static void put(unsigned char *image, size_t offset, const void *bytes, size_t size) {
+    memcpy(image + offset, bytes, size);
+}
+
+static void put_u16(unsigned char *image, size_t offset, unsigned value) {
+    const uint16_t word = (uint16_t)value;
+    put(image, offset, &word, sizeof word);
+}
+
+static void put_u32(unsigned char *image, size_t offset, size_t value) {
+    const uint32_t word = (uint32_t)value;
+    put(image, offset, &word, sizeof word);
+}
+
+static void put_header(const struct build *build, struct table_image *image) {
+    const struct module_description *module = build->module;
+    const uint64_t hash = module_description_hash(module);
+    const float geometry[] = {(float)module->outer_diameter_m,
+                              (float)module->chamber_length_m,
+                              (float)(module->chamber_length_m + module->end_correction_m),
+                              (float)module->cap_proximal_m,
+                              (float)module->cap_distal_m,
+                              (float)module->working_pressure_pa,
+                              (float)module->burst_pressure_pa,
+                              (float)module->bend_limit_rad};
+    put(image->bytes, 0, BEND_TABLE_MAGIC, 4);
+    put_u16(image->bytes, BEND_TABLE_OFFSET_VERSION, BEND_TABLE_VERSION);
+    put_u16(image->bytes, BEND_TABLE_OFFSET_HEADER_BYTES, BEND_TABLE_HEADER_BYTES);
+    put_u32(image->bytes, BEND_TABLE_OFFSET_IMAGE_BYTES, image->size);
+    put(image->bytes, BEND_TABLE_OFFSET_NAME, module->name, strlen(module->name));
+    put(image->bytes, BEND_TABLE_OFFSET_HASH, &hash, sizeof hash);
+    for (size_t a = 0; a < 3; a++) {
+        put_u32(image->bytes, BEND_TABLE_OFFSET_NODES + 4 * a, build->n);
+    }
+    put_u32(image->bytes, BEND_TABLE_OFFSET_CHANNELS, BEND_TABLE_CHANNEL_COUNT);
+    put(image->bytes, BEND_TABLE_OFFSET_GEOMETRY, geometry, sizeof geometry);
+    put(image->bytes, BEND_TABLE_OFFSET_CHANNEL_TEXT, BEND_TABLE_CHANNEL_TEXT, strlen(BEND_TABLE_CHANNEL_TEXT));
+}
+
+static void put_nodes(const struct build *build, struct table_image *image) {
+    const size_t n = build->n, count = n * n * n;
+    unsigned char *axes = image->bytes + BEND_TABLE_HEADER_BYTES;
+    unsigned char *channels = axes + 3 * n * sizeof(float);
+    unsigned char *tags = channels + BEND_TABLE_CHANNEL_COUNT * count * sizeof(float);
+    for (size_t i = 0; i < 3 * n; i++) {
+        const float pressure_pa = (float)build->axis_pa[i % n];
+        put(axes, i * sizeof(float), &pressure_pa, sizeof pressure_pa);
+    }
+    for (size_t at = 0; at < count; at++) {
+        const size_t index[3] = {at / (n * n), at / n % n, at % n};
+        size_t order[3];
+        sort_chambers(index, order);
+        const size_t i = index[order[0]], j = index[order[1]], k = index[order[2]];
+        struct node filled, turned;
+        const struct node *solved = node_at(build, i, j, k);
+        if (solved->tag == 0) {
+            filled = fill_node(build, i, j, k);
+            solved = &filled;
+        }
+        turn_node(solved, order, &turned);
+        for (size_t c = 0; c < BEND_TABLE_CHANNEL_COUNT; c++) {
+            put(channels, (c * count + at) * sizeof(float), &turned.value[c], sizeof(float));
+        }
+        tags[at] = turned.tag;
+    }
+}
+
+static bool make_image(const struct build *build, struct table_image *image) {
+    const size_t count = build->n * build->n * build->n;
+    const size_t used = BEND_TABLE_HEADER_BYTES + sizeof(float) * (3 * build->n + BEND_TABLE_CHANNEL_COUNT * count) + count;
+    image->size = (used + 3) / 4 * 4;
+    image->bytes = calloc(image->size, 1);
+    if (image->bytes == NULL) {
+        return false;
+    }
+    put_header(build, image);
+    put_nodes(build, image);
+    const size_t covered = BEND_TABLE_OFFSET_CRC + 4;
+    put_u32(image->bytes, BEND_TABLE_OFFSET_CRC, crc32(0, image->bytes + covered, (uInt)(image->size - covered)));
+    image->nodes = count;
+    image->solved = build->done;
+    image->no_equilibrium = build->no_equilibrium;
+    image->newton_iterations = build->newton_iterations;
+    return true;
+}
+
+/* Does a mirror at chamber 1's axis leave the section as it is? Only then does one sixth make the whole. */
+static bool has_mirror(const struct module_description *module) {
+    const struct chamber *chamber = &module->chamber[0];
+    for (size_t k = 0; k < chamber->cavity_count; k++) {
+        const struct cavity *cavity = &chamber->cavity[k];
+        if (fabs(cavity->centre_m[1]) > 1e-9 ||
+            (cavity->shape == CAVITY_SEMICIRCLE && fabs(sin(cavity->orientation_rad)) > 1e-9)) {
+            return false;
+        }
+    }
+    return module->three_fold;
+}
+
+static bool run(struct build *build, struct table_image *image, struct description_error *error) {
+    const struct section_mesh_options mesh_options = {.size_m = build->options->size_m};
+    struct section_mesh *mesh = section_mesh_create(build->module, &mesh_options, error);
+    if (mesh == NULL) {
+        return false;
+    }
+    solve_all(build, mesh, error);
+    section_mesh_free(mesh);
+    if (build->failed) {
+        return false;
+    }
+    if (stopped(build)) {
+        (void)snprintf(error->text, sizeof error->text, "interrupted after %zu of %zu equilibria; nothing was written",
+                       build->done, build->total);
+        return false;
+    }
+    if (build->base_count < 3) {
+        (void)snprintf(error->text, sizeof error->text,
+                       "material %s has no stable equilibrium above %.0f Pa: no table can be made of it",
+                       build->module->material.name, build->axis_pa[build->base_count == 0 ? 0 : build->base_count - 1]);
+        return false;
+    }
+    if (!make_image(build, image)) {
+        (void)snprintf(error->text, sizeof error->text, "out of memory for the table's image");
+        return false;
+    }
+    return true;
+}
+
+bool table_build(const struct module_description *module, const struct table_build_options *options,
+                 struct table_image *image, struct description_error *error) {
+    struct build build = {.module = module, .options = options};
+    memset(image, 0, sizeof *image);
+    build.n = options->nodes == 0 ? TABLE_NODES_DEFAULT : options->nodes;
+    if (build.n < TABLE_NODES_LEAST || build.n > BEND_TABLE_AXIS_NODES_MAX) {
+        (void)snprintf(error->text, sizeof error->text, "a table takes %d to %u nodes on each axis, not %zu",
+                       TABLE_NODES_LEAST, BEND_TABLE_AXIS_NODES_MAX, build.n);
+        return false;
+    }
+    if (!has_mirror(module)) {
+        (void)snprintf(error->text, sizeof error->text,
+                       "module %s: tables are built for three equal chambers that are symmetric about their axis; "
+                       "describe one such chamber",
+                       module->name);
+        return false;
+    }
+    build.total = build.n * (build.n + 1) * (build.n + 2) / 6;
+    for (size_t i = 0; i < build.n; i++) {
+        build.axis_pa[i] = AXIS_MARGIN * module->working_pressure_pa *
+                           pow((double)i / (double)(build.n - 1), AXIS_EXPONENT);
+    }
+    build.node = calloc(build.n * build.n * build.n, sizeof *build.node);
+    bool built = false;
+    if (build.node == NULL) {
+        (void)snprintf(error->text, sizeof error->text, "out of memory for the table's nodes");
+    } else {
+        built = run(&build, image, error);
+    }
+    free(build.node);
+    free(build.base);
+    return built;
+}
+
+void table_image_free(struct table_image *image) {
+    free(image->bytes);
+    memset(image, 0, sizeof *image);
+}
+
+bool table_image_write(const struct table_image *image, const char *path, char *error, size_t error_bytes) {
+    struct output_file file;
+    if (!output_file_open(&file, path, error, error_bytes)) {
+        return false;
+    }
+    (void)fwrite(image->bytes, 1, image->size, file.stream); /* commit looks at the stream's error flag */
+    return output_file_commit(&file, error, error_bytes);
+}
