@@ -4,6 +4,7 @@
 
 #include <gmshc.h>
 #include <math.h>
+#include <omp.h>
 #include <stdarg.h>
 #include <stdint.h>
 #include <stdio.h>
@@ -28,6 +29,7 @@ static void set_error(struct description_error *error, const char *format, ...) 
 
 struct sketch {
     int failed;
+    int threads; /* OpenMP's setting, which gmsh overwrites for the whole program */
 };
 
 static int add_point(struct sketch *sketch, double x, double y, double size) {
@@ -68,6 +70,7 @@ static int add_surface(struct sketch *sketch, int *loops, size_t count) {
 static void begin_sketch(struct sketch *sketch) {
     int error = 0;
     sketch->failed = 0;
+    sketch->threads = omp_get_max_threads();
     gmshInitialize(0, NULL, 0, &error);
     sketch->failed |= error;
     gmshOptionSetNumber("General.Terminal", 0.0, &error);
@@ -224,6 +227,7 @@ static struct section_mesh *generate(struct sketch *sketch) {
     gmshFree(coordinate);
     gmshFree(parametric);
     gmshFinalize(&error);
+    omp_set_num_threads(sketch->threads);
     return mesh;
 }
 

@@ -94,7 +94,7 @@ lint-firmware:
 	    $$c $(FIRMWARE_FLAGS) -c $$f -o /dev/null || { echo "lint: $$c rejects $$f"; exit 1; }; done; done
 lint-clang:
 	@set -e; for f in $(HOST_SIDE_C); do clang -O1 $(COMMON_FLAGS) -Wno-unknown-pragmas -Wno-source-uses-openmp \
-	    -fsyntax-only $$f; done
+	    -fopenmp -fsyntax-only $$f; done
 lint-cppcheck:
 	@cppcheck -j$(JOBS) $(CPPCHECK_FLAGS) $(FIRMWARE_C) $(SIM_C) $(MODEL_C) $(TABLES_CLI_C) $(HOST_C) $(HOST_MAIN)
 lint-tidy:
