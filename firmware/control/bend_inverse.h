@@ -26,7 +26,7 @@ struct bend_inverse_result {
     float direction_rad;
     float residual_rad;  /* angle between the request (after limits) and what the table gives */
     uint32_t flags;
-    uint32_t iterations;
+    uint32_t iterations; /* evaluations of the table */
 };
 
 /* `warm_pa` may be NULL; else a guess (the last answer). */

@@ -17,7 +17,7 @@ _Static_assert(__BYTE_ORDER__ == __ORDER_LITTLE_ENDIAN__, "the image is written 
 /* The axis reaches past the working pressure, so that control and simulation never leave it in normal use. */
 #define AXIS_MARGIN 1.1
 /* p_i = p_max (i / (n - 1))^exponent: closer nodes at high pressure, where bend rises fastest. */
-#define AXIS_EXPONENT 0.65
+#define AXIS_EXPONENT 0.8
 
 struct node {
     float value[BEND_TABLE_CHANNEL_COUNT];
