@@ -95,6 +95,9 @@ static enum bend_table_status bind_arrays(struct bend_table *table, const uint8_
         next += nodes;
     }
     table->tag = (const uint8_t *)(const void *)next;
+    table->image = image;
+    table->image_bytes = (uint32_t)size;
+    table->image_crc = read_u32(image, BEND_TABLE_OFFSET_CRC);
     return BEND_TABLE_OK;
 }
 

@@ -72,6 +72,9 @@ struct bend_table {
     const float *axis_pa[3];  /* strictly rising, first 0 */
     const float *channel[BEND_TABLE_CHANNEL_COUNT]; /* [i3 + nodes[2] * (i2 + nodes[1] * i1)] */
     const uint8_t *tag;
+    const uint8_t *image; /* as a whole, to be checked again while running */
+    uint32_t image_bytes;
+    uint32_t image_crc;
     /* slope at node i of axis a = sum_k slope[a][i][k] * f[j + k], j = i - 1 kept within [0, nodes - 3] */
     float slope[3][BEND_TABLE_AXIS_NODES_MAX][3];
 };

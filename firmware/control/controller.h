@@ -33,7 +33,6 @@ struct controller_command {
 };
 
 struct controller_parameters {
-    int64_t pwm_period_us;
     int64_t tip_period_us;       /* expected; a sample overdue by tip_overdue_us opens the tip loop */
     int64_t tip_overdue_us;
     int64_t command_timeout_us;
@@ -93,6 +92,9 @@ struct controller {
     int64_t command_us;
     int64_t tip_us;
     bool tip_lost;
+    bool targets_stale;    /* a new command or tip sample since the targets were computed */
+    uint32_t step;
+    float capacity_m3[3];
 };
 
 /* The nominal board and plant of the design page; limits from the table's module where there is one. */

@@ -35,4 +35,42 @@ enum supervisor_warning {
     WARNING_COUNT
 };
 
+/* A row of the fault table: what people need to know of each fault. */
+struct supervisor_fault_row {
+    const char *name;
+    const char *detector;
+    const char *reaction;
+    const char *clear;
+};
+
+/* What the controller wants; refused by the state where it must be. */
+enum supervisor_request {
+    SUPERVISOR_REQUEST_NONE = 0,
+    SUPERVISOR_REQUEST_VENT,
+    SUPERVISOR_REQUEST_HOLD,
+    SUPERVISOR_REQUEST_MOVE,
+    SUPERVISOR_REQUEST_CLEAR
+};
+
+struct supervisor {
+    enum supervisor_state state;
+    uint32_t faults;        /* latched, bit = enum supervisor_fault */
+    int64_t entered_us;     /* when the state was entered */
+};
+
+#define SUPERVISOR_SELFTEST_US 20000
+
+void supervisor_init(struct supervisor *supervisor);
+/* One step. `present` are the faults that are detected now (bits); `healthy` says that the self-test sees what it must.
+ * Returns false when a request was refused. */
+bool supervisor_step(struct supervisor *supervisor, int64_t time_us, uint32_t present, bool healthy,
+                     enum supervisor_request request);
+/* May the valves be energised? Only in ACTIVE and HOLD. */
+bool supervisor_valves_enabled(const struct supervisor *supervisor);
+/* May the supply be open? Not in BOOT and FAULT. */
+bool supervisor_supply_enabled(const struct supervisor *supervisor);
+const char *supervisor_state_name(enum supervisor_state state);
+const struct supervisor_fault_row *supervisor_fault_describe(enum supervisor_fault fault);
+const char *supervisor_warning_text(enum supervisor_warning warning);
+
 #endif

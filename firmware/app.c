@@ -1,0 +1,68 @@
+#include "app.h"
+
+#include <stddef.h>
+
+#define TIP_SAMPLES_A_STEP 4u
+
+void app_init(struct app *app, const struct hal *hal, const struct bend_table *table,
+              const struct controller_parameters *parameters) {
+    controller_init(&app->controller, table, parameters);
+    app->hal = hal;
+    app->pending = (struct controller_command){.kind = COMMAND_NONE};
+    app->hal_errors = 0u;
+}
+
+void app_command(struct app *app, const struct controller_command *command) {
+    app->pending = *command;
+}
+
+/* The newest of the samples that arrived; older ones that came with it say nothing more. */
+static void read_tip(struct app *app, struct controller_input *input) {
+    const struct hal *hal = app->hal;
+    struct hal_tip_sample sample;
+    for (uint32_t i = 0; i < TIP_SAMPLES_A_STEP && hal->read_tip(hal->context, &sample); i++) {
+        input->tip_new = true;
+        input->tip_measured_us = sample.measured_us;
+        for (uint32_t k = 0; k < 3u; k++) {
+            input->tip_position_m[k] = sample.position_m[k];
+        }
+        for (uint32_t k = 0; k < 4u; k++) {
+            input->tip_quaternion[k] = sample.quaternion[k];
+        }
+        input->tip_quality = sample.quality;
+        input->tip_status = sample.status;
+    }
+}
+
+static void read_pressures(struct app *app, struct controller_input *input) {
+    struct hal_pressures pressures;
+    if (!app->hal->read_pressures(app->hal->context, &pressures)) {
+        app->hal_errors++;
+        return; /* every channel stays not ok: a sensor fault */
+    }
+    for (uint32_t c = 0; c < 3u; c++) {
+        input->pressure_pa[c] = pressures.chamber_pa[c];
+        input->pressure_ok[c] = pressures.chamber_ok[c];
+    }
+    input->supply_pa = pressures.supply_pa;
+    input->supply_ok = pressures.supply_ok;
+}
+
+bool app_step(struct app *app) {
+    struct controller_input input = {.time_us = app->hal->time_us(app->hal->context), .command = app->pending};
+    struct controller_output output;
+    struct hal_outputs outputs;
+    app->pending.kind = COMMAND_NONE;
+    read_pressures(app, &input);
+    read_tip(app, &input);
+    controller_step(&app->controller, &input, &output);
+    for (uint32_t c = 0; c < 3u; c++) {
+        outputs.duty[c] = output.duty[c];
+    }
+    outputs.valves_enabled = output.valves_enabled;
+    outputs.supply_enabled = output.supply_enabled;
+    if (!app->hal->write_outputs(app->hal->context, &outputs)) {
+        app->hal_errors++;
+    }
+    return app->controller.status.state != SUPERVISOR_FAULT;
+}

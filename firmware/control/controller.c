@@ -1,0 +1,262 @@
+/* The order of a step: estimate pressures, look for faults, take the command, let the supervisor decide, compute the
+ * targets, write duties. State that lives here: the command being followed and when it came, when the last tip sample
+ * came, and each chamber's capacity from the table. */
+#include "control/controller.h"
+
+#include <stddef.h>
+
+#include "control/real_math.h"
+
+#define SUPPLY_LEAST_PA 1000.0f
+#define SELFTEST_PRESSURE_PA 2000.0f
+
+void controller_default_parameters(struct controller_parameters *parameters, const struct bend_table *table) {
+    *parameters = (struct controller_parameters){
+        .tip_period_us = 10000, .tip_overdue_us = 5000, .command_timeout_us = 500000};
+    pressure_loop_default_parameters(&parameters->pressure_loop);
+    tip_loop_default_parameters(&parameters->tip_loop);
+    limits_default_parameters(&parameters->limits, table);
+}
+
+void controller_init(struct controller *controller, const struct bend_table *table,
+                     const struct controller_parameters *parameters) {
+    *controller = (struct controller){.table = table, .parameters = *parameters};
+    supervisor_init(&controller->supervisor);
+    limits_init(&controller->limits);
+    tip_loop_init(&controller->tip_loop);
+    for (uint32_t c = 0; c < 3u; c++) {
+        pressure_loop_init(&controller->pressure_loop[c]);
+        controller->capacity_m3[c] = parameters->pressure_loop.nominal_capacity_m3;
+    }
+    controller->tip_lost = true;
+    controller->status.state = SUPERVISOR_BOOT;
+}
+
+/* --- pressures --- */
+
+/* V + p_abs dV/dp of chamber `c` with its tube; the pull of the other chambers on V is left to the observer. */
+static float capacity_of(const struct controller *controller, const struct bend_table_stencil *stencil, uint32_t c) {
+    const struct pressure_loop_parameters *parameters = &controller->parameters.pressure_loop;
+    const float length_m = controller->table->module.chamber_length_m;
+    float gradient[3];
+    const float volume_m2 = bend_table_gradient(
+        controller->table, stencil, (enum bend_table_channel)((uint32_t)BEND_TABLE_VOLUME_1 + c), gradient);
+    const float pressure_pa_abs = parameters->ambient_pa_abs + controller->pressure_loop[c].estimate_pa;
+    return parameters->tube_volume_m3 + length_m * (volume_m2 + pressure_pa_abs * real_max(gradient[c], 0.0f));
+}
+
+static float supply_of(const struct controller *controller, const struct controller_input *input) {
+    const bool known = input->supply_ok && real_is_finite(input->supply_pa) && input->supply_pa > SUPPLY_LEAST_PA;
+    return known ? input->supply_pa : controller->parameters.pressure_loop.nominal_supply_pa;
+}
+
+static void estimate(struct controller *controller, const struct controller_input *input) {
+    const struct pressure_loop_parameters *parameters = &controller->parameters.pressure_loop;
+    float pressure_pa[3];
+    for (uint32_t c = 0; c < 3u; c++) {
+        struct pressure_loop *loop = &controller->pressure_loop[c];
+        if (controller->step > 0u) {
+            pressure_loop_predict(loop, parameters, supply_of(controller, input), controller->capacity_m3[c],
+                                  input->time_us, CONTROLLER_STEP_US);
+        }
+        if (input->pressure_ok[c] && real_is_finite(input->pressure_pa[c])) {
+            pressure_loop_correct(loop, parameters, input->pressure_pa[c], controller->capacity_m3[c],
+                                  CONTROLLER_STEP_US);
+        }
+        pressure_pa[c] = loop->estimate_pa;
+        controller->status.pressure_estimate_pa[c] = loop->estimate_pa;
+    }
+    if (controller->table != NULL) {
+        struct bend_table_stencil stencil;
+        bend_table_locate(controller->table, pressure_pa, &stencil);
+        for (uint32_t c = 0; c < 3u; c++) {
+            controller->capacity_m3[c] = capacity_of(controller, &stencil, c);
+        }
+    }
+    tip_loop_store(&controller->tip_loop, pressure_pa);
+}
+
+/* --- tip --- */
+
+static void follow_tip(struct controller *controller, const struct controller_input *input) {
+    const struct controller_parameters *parameters = &controller->parameters;
+    if (input->tip_new) {
+        const bool good = input->tip_status == 0u &&
+                          tip_loop_update(&controller->tip_loop, &parameters->tip_loop, controller->table,
+                                          input->tip_quaternion, input->time_us - input->tip_measured_us,
+                                          CONTROLLER_STEP_US);
+        controller->status.tip_samples += good ? 1u : 0u;
+        controller->status.tip_rejected += good ? 0u : 1u;
+        if (good) {
+            controller->tip_us = input->time_us;
+            controller->tip_lost = false;
+            controller->targets_stale = true;
+        }
+    }
+    const bool overdue = input->time_us - controller->tip_us >= parameters->tip_period_us + parameters->tip_overdue_us;
+    if (overdue && !controller->tip_lost) {
+        controller->tip_lost = true; /* the last correction is kept: it is the best that is known of the model's error */
+        controller->status.tip_lost_count++;
+    }
+}
+
+static void report_bend(struct controller *controller) {
+    float bend[2] = {controller->tip_loop.measured_rad[0], controller->tip_loop.measured_rad[1]};
+    if (controller->tip_lost && controller->table != NULL) {
+        tip_loop_predict(controller->table, controller->status.pressure_estimate_pa, bend);
+        bend[0] += controller->tip_loop.correction_rad[0];
+        bend[1] += controller->tip_loop.correction_rad[1];
+    }
+    controller->status.bend_rad = real_hypot(bend[0], bend[1]);
+    controller->status.direction_rad = real_atan2(bend[1], bend[0]);
+    controller->status.bend_is_measured = !controller->tip_lost;
+}
+
+/* --- commands --- */
+
+static bool command_is_sound(const struct controller *controller, const struct controller_command *command) {
+    if (command->kind == COMMAND_PRESSURE) {
+        return real_is_finite(command->pressure_pa[0]) && real_is_finite(command->pressure_pa[1]) &&
+               real_is_finite(command->pressure_pa[2]);
+    }
+    if (command->kind == COMMAND_BEND) {
+        return controller->table != NULL && real_is_finite(command->bend_rad) && command->bend_rad >= 0.0f &&
+               real_is_finite(command->direction_rad) && real_is_finite(command->co_contraction_pa);
+    }
+    return true;
+}
+
+static enum supervisor_request request_of(enum controller_command_kind kind) {
+    switch (kind) {
+    case COMMAND_VENT:
+        return SUPERVISOR_REQUEST_VENT;
+    case COMMAND_HOLD:
+        return SUPERVISOR_REQUEST_HOLD;
+    case COMMAND_PRESSURE:
+    case COMMAND_BEND:
+        return SUPERVISOR_REQUEST_MOVE;
+    case COMMAND_CLEAR:
+        return SUPERVISOR_REQUEST_CLEAR;
+    case COMMAND_NONE:
+    default:
+        return SUPERVISOR_REQUEST_NONE;
+    }
+}
+
+/* Faults from this step's readings, the table's check and the age of the last command. */
+static uint32_t find_faults(struct controller *controller, const struct controller_input *input) {
+    uint32_t faults = limits_check_pressures(&controller->parameters.limits, input->pressure_pa, input->pressure_ok);
+    if (controller->table != NULL &&
+        limits_check_table(&controller->limits, &controller->parameters.limits, controller->table)) {
+        faults |= 1u << FAULT_TABLE_CORRUPT;
+    }
+    const bool moves = supervisor_valves_enabled(&controller->supervisor);
+    if (moves && input->command.kind == COMMAND_NONE &&
+        input->time_us - controller->command_us >= controller->parameters.command_timeout_us) {
+        faults |= 1u << FAULT_COMMAND_TIMEOUT;
+    }
+    return faults;
+}
+
+static void supervise(struct controller *controller, const struct controller_input *input) {
+    const struct controller_command *command = &input->command;
+    const uint32_t present = find_faults(controller, input);
+    bool healthy = true; /* the self-test waits until every chamber has vented, should it run into a restart */
+    for (uint32_t c = 0; c < 3u; c++) {
+        healthy = healthy && input->pressure_pa[c] < SELFTEST_PRESSURE_PA;
+    }
+    const bool sound = command_is_sound(controller, command);
+    const enum supervisor_request request = sound ? request_of(command->kind) : SUPERVISOR_REQUEST_NONE;
+    const bool accepted =
+        supervisor_step(&controller->supervisor, input->time_us, present, healthy, request) && sound;
+    controller->status.commands_refused += accepted ? 0u : 1u;
+    if (command->kind != COMMAND_NONE && accepted) {
+        controller->command_us = input->time_us;
+        if (command->kind == COMMAND_HOLD && controller->active.kind != COMMAND_HOLD) {
+            for (uint32_t c = 0; c < 3u; c++) {
+                controller->active.pressure_pa[c] = controller->status.pressure_estimate_pa[c];
+            }
+            controller->active.kind = COMMAND_HOLD;
+        } else if (command->kind != COMMAND_HOLD) {
+            controller->active = *command;
+        }
+        controller->targets_stale = true;
+    }
+}
+
+/* --- targets and duties --- */
+
+static void aim_at_bend(struct controller *controller) {
+    const struct controller_command *command = &controller->active;
+    const float *correction = controller->tip_loop.correction_rad;
+    const float x = command->bend_rad * real_cos(command->direction_rad) - correction[0];
+    const float y = command->bend_rad * real_sin(command->direction_rad) - correction[1];
+    /* no bend wanted means no pressure, whatever the sensor's noise says */
+    const bool none = !(command->bend_rad > 0.0f);
+    const struct bend_inverse_request request = {none ? 0.0f : real_hypot(x, y), real_atan2(y, x),
+                                                 command->co_contraction_pa};
+    bend_inverse_solve(controller->table, &request, controller->status.pressure_target_pa, &controller->status.inverse);
+    for (uint32_t c = 0; c < 3u; c++) {
+        controller->status.pressure_target_pa[c] = controller->status.inverse.pressure_pa[c];
+    }
+}
+
+static void aim(struct controller *controller) {
+    struct controller_status *status = &controller->status;
+    if (!supervisor_valves_enabled(&controller->supervisor)) {
+        for (uint32_t c = 0; c < 3u; c++) {
+            status->pressure_target_pa[c] = 0.0f;
+        }
+        status->inverse.flags = 0u;
+    } else if (controller->active.kind == COMMAND_BEND) {
+        if (controller->targets_stale) {
+            aim_at_bend(controller);
+        }
+    } else {
+        status->inverse.flags = 0u;
+        for (uint32_t c = 0; c < 3u; c++) {
+            const float wanted_pa = controller->active.pressure_pa[c];
+            status->pressure_target_pa[c] =
+                real_clamp(wanted_pa, 0.0f, controller->parameters.limits.working_pressure_pa);
+            if (wanted_pa < 0.0f || wanted_pa > controller->parameters.limits.working_pressure_pa) {
+                status->inverse.flags |= (uint32_t)BEND_INVERSE_LIMITED_PRESSURE;
+            }
+        }
+    }
+    controller->targets_stale = false;
+}
+
+static void drive(struct controller *controller, const struct controller_input *input,
+                  struct controller_output *output) {
+    const struct pressure_loop_parameters *parameters = &controller->parameters.pressure_loop;
+    output->valves_enabled = supervisor_valves_enabled(&controller->supervisor);
+    output->supply_enabled = supervisor_supply_enabled(&controller->supervisor);
+    for (uint32_t c = 0; c < 3u; c++) {
+        struct pressure_loop *loop = &controller->pressure_loop[c];
+        output->duty[c] = 0.0f;
+        if (output->valves_enabled) {
+            output->duty[c] = pressure_loop_duty(loop, parameters, controller->status.pressure_target_pa[c],
+                                                 supply_of(controller, input), controller->capacity_m3[c],
+                                                 input->time_us);
+        } else {
+            pressure_loop_vent(loop, parameters, input->time_us);
+        }
+    }
+}
+
+void controller_step(struct controller *controller, const struct controller_input *input,
+                     struct controller_output *output) {
+    estimate(controller, input);
+    follow_tip(controller, input);
+    supervise(controller, input);
+    aim(controller);
+    drive(controller, input, output);
+    report_bend(controller);
+    controller->step++;
+    struct controller_status *status = &controller->status;
+    status->state = controller->supervisor.state;
+    status->faults = controller->supervisor.faults;
+    status->warnings = (controller->tip_lost ? 1u << WARNING_TIP_LOST : 0u) |
+                       (controller->table == NULL ? 1u << WARNING_NO_TABLE : 0u) |
+                       (status->inverse.flags != 0u ? 1u << WARNING_COMMAND_LIMITED : 0u);
+}

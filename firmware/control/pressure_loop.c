@@ -1,0 +1,181 @@
+#include "control/pressure_loop.h"
+
+#include "control/real_math.h"
+
+#define SECONDS_PER_US 1e-6f
+#define INNOVATION_SHARE 0.0625f
+#define INNOVATION_SIGMAS 0.54f /* three sigma of an average over 1/16: 3 sqrt(1/31) of one sample's */
+#define CLIPPED_SIGMAS 3.0f     /* closer to zero than this, readings are clipped and say little */
+#define PULSE_MARGIN_US 100.0f  /* a pulse is this much longer than the open delay, or left out */
+#define CAPACITY_LEAST_M3 1e-6f
+
+void pressure_loop_default_parameters(struct pressure_loop_parameters *parameters) {
+    *parameters = (struct pressure_loop_parameters){
+        .pwm_period_us = 10000,
+        .open_delay_us = 1500,
+        .close_delay_us = 1000,
+        .ambient_pa_abs = 101325.0f,
+        .flow_factor = 2e-10f * 1.185f * 287.0f * 293.15f,
+        .critical_ratio = 0.3f,
+        .nominal_supply_pa = 40000.0f,
+        .tube_volume_m3 = 2e-6f,
+        .nominal_capacity_m3 = 1.5e-4f,
+        .sensor_noise_pa = 150.0f,
+        .gain = 0.008f,
+        .gain_fast = 0.1f,
+        .bias_gain_per_s = 4.0f,
+        .bias_limit = 0.3f,
+    };
+}
+
+void pressure_loop_init(struct pressure_loop *loop) {
+    *loop = (struct pressure_loop){.estimate_pa = 0.0f};
+}
+
+/* p V flow through valve and tube at 293.15 K (ISO 6358-1:2013): zero against the pressure. */
+static float gas_flow(const struct pressure_loop_parameters *parameters, float up_pa_abs, float down_pa_abs) {
+    if (!(up_pa_abs > down_pa_abs)) {
+        return 0.0f;
+    }
+    const float ratio = down_pa_abs / up_pa_abs, b = parameters->critical_ratio;
+    const float choked = parameters->flow_factor * up_pa_abs;
+    if (ratio <= b) {
+        return choked;
+    }
+    const float share = (ratio - b) / (1.0f - b);
+    return choked * real_sqrt(1.0f - share * share);
+}
+
+/* Rates of pressure while filling and while venting, Pa/s, both positive. */
+static void rates(const struct pressure_loop *loop, const struct pressure_loop_parameters *parameters,
+                  float pressure_pa, float supply_pa, float capacity_m3, float *fill, float *vent) {
+    const float chamber_pa_abs = parameters->ambient_pa_abs + pressure_pa;
+    const float capacity = real_max(capacity_m3, CAPACITY_LEAST_M3);
+    *fill = (gas_flow(parameters, parameters->ambient_pa_abs + supply_pa, chamber_pa_abs) + loop->bias) / capacity;
+    *vent = (gas_flow(parameters, chamber_pa_abs, parameters->ambient_pa_abs) - loop->bias) / capacity;
+}
+
+static int64_t most(int64_t a, int64_t b) {
+    return a > b ? a : b;
+}
+
+static int64_t least(int64_t a, int64_t b) {
+    return a < b ? a : b;
+}
+
+/* The period that starts at `start_us` takes over the duty written last. A valve that is still open when its coil is
+ * energised again stays open; a pulse shorter than the open delay does not open it. */
+static void start_period(struct pressure_loop *loop, const struct pressure_loop_parameters *parameters,
+                         int64_t start_us) {
+    loop->duty = loop->duty_next;
+    const int64_t on_us = (int64_t)(loop->duty * (float)parameters->pwm_period_us + 0.5f);
+    const bool still_open = loop->open_at_us < start_us && loop->close_at_us > start_us;
+    if (on_us > 0 && still_open) {
+        loop->close_at_us = start_us + on_us + parameters->close_delay_us;
+    } else if (on_us > parameters->open_delay_us) {
+        loop->open_at_us = start_us + parameters->open_delay_us;
+        loop->close_at_us = start_us + on_us + parameters->close_delay_us;
+    }
+}
+
+void pressure_loop_predict(struct pressure_loop *loop, const struct pressure_loop_parameters *parameters,
+                           float supply_pa, float capacity_m3, int64_t time_us, int64_t step_us) {
+    const int64_t from_us = time_us - step_us;
+    const int64_t open_us = most(0, least(time_us, loop->close_at_us) - most(from_us, loop->open_at_us));
+    const float share = (float)open_us / (float)step_us;
+    float fill = 0.0f, vent = 0.0f;
+    rates(loop, parameters, loop->estimate_pa, supply_pa, capacity_m3, &fill, &vent);
+    loop->estimate_pa += (float)step_us * SECONDS_PER_US * (share * fill - (1.0f - share) * vent);
+    loop->estimate_pa = real_max(loop->estimate_pa, 0.0f);
+    if (time_us % parameters->pwm_period_us == 0) {
+        start_period(loop, parameters, time_us); /* with the duty of the step before: this one's comes too late */
+    }
+}
+
+void pressure_loop_correct(struct pressure_loop *loop, const struct pressure_loop_parameters *parameters,
+                           float measured_pa, float capacity_m3, int64_t step_us) {
+    const float clip_pa = CLIPPED_SIGMAS * parameters->sensor_noise_pa;
+    const float innovation_pa = measured_pa - loop->estimate_pa;
+    if (loop->estimate_pa < clip_pa && measured_pa < 1.5f * clip_pa) {
+        loop->innovation_pa = 0.0f;
+        return;
+    }
+    loop->innovation_pa += INNOVATION_SHARE * (innovation_pa - loop->innovation_pa);
+    const bool off = real_abs(loop->innovation_pa) > INNOVATION_SIGMAS * parameters->sensor_noise_pa;
+    loop->estimate_pa += (off ? parameters->gain_fast : parameters->gain) * innovation_pa;
+    loop->estimate_pa = real_max(loop->estimate_pa, 0.0f);
+    loop->bias += parameters->bias_gain_per_s * (float)step_us * SECONDS_PER_US * innovation_pa * capacity_m3;
+    loop->bias = real_clamp(loop->bias, -parameters->bias_limit, parameters->bias_limit);
+}
+
+/* How far the mean of a steady saw lies above its value at a period's start: down for the open delay, up for the fill,
+ * down for the rest. */
+static float saw_offset(float fill, float vent, float wait_s, float period_s) {
+    const float fill_s = vent * period_s / (fill + vent);
+    const float rest_s = real_max(period_s - wait_s - fill_s, 0.0f);
+    const float low = -vent * wait_s, high = low + fill * fill_s;
+    const float area = 0.5f * low * wait_s + 0.5f * (low + high) * fill_s + (high - 0.5f * vent * rest_s) * rest_s;
+    return area / period_s;
+}
+
+/* Energised time that fills for `fill_us` of a period, from a valve that is closed at its start. */
+static float pulse_from_closed(const struct pressure_loop_parameters *parameters, float fill_us) {
+    const float period_us = (float)parameters->pwm_period_us;
+    const float open_us = (float)parameters->open_delay_us, close_us = (float)parameters->close_delay_us;
+    const float shortest_us = close_us + PULSE_MARGIN_US;
+    if (fill_us < 0.5f * shortest_us) {
+        return 0.0f;
+    }
+    if (fill_us < shortest_us) {
+        return open_us + PULSE_MARGIN_US;
+    }
+    const float pulse_us = fill_us + open_us - close_us;
+    return pulse_us <= period_us - close_us ? pulse_us : period_us;
+}
+
+/* The same from a valve that is still open. */
+static float pulse_from_open(const struct pressure_loop_parameters *parameters, float fill_us) {
+    const float period_us = (float)parameters->pwm_period_us, close_us = (float)parameters->close_delay_us;
+    const float pulse_us = real_max(fill_us - close_us, 0.0f);
+    if (pulse_us <= period_us - close_us) {
+        return pulse_us;
+    }
+    return pulse_us > period_us - 0.5f * close_us ? period_us : period_us - close_us;
+}
+
+float pressure_loop_duty(struct pressure_loop *loop, const struct pressure_loop_parameters *parameters, float target_pa,
+                         float supply_pa, float capacity_m3, int64_t time_us) {
+    const int64_t period_us = parameters->pwm_period_us;
+    const int64_t left_us = period_us - time_us % period_us;
+    const float period_s = (float)period_us * SECONDS_PER_US;
+    if (!(target_pa > 0.0f)) {
+        loop->duty_next = 0.0f;
+        return 0.0f;
+    }
+    /* where the pressure will be when the period starts */
+    float fill = 0.0f, vent = 0.0f;
+    rates(loop, parameters, loop->estimate_pa, supply_pa, capacity_m3, &fill, &vent);
+    const int64_t start_us = time_us + left_us;
+    const int64_t open_us = most(0, least(start_us, loop->close_at_us) - most(time_us, loop->open_at_us));
+    const float filling_s = (float)open_us * SECONDS_PER_US, left_s = (float)left_us * SECONDS_PER_US;
+    const float start_pa = real_max(0.0f, loop->estimate_pa + fill * filling_s - vent * (left_s - filling_s));
+    /* what the period must do: end where a steady saw about the target starts */
+    rates(loop, parameters, 0.5f * (start_pa + target_pa), supply_pa, capacity_m3, &fill, &vent);
+    fill = real_max(fill, 1.0f);
+    vent = real_max(vent, 0.0f);
+    const float wait_s = (float)parameters->open_delay_us * SECONDS_PER_US;
+    const float end_pa = target_pa - saw_offset(fill, vent, wait_s, period_s);
+    const float fill_us = (end_pa - start_pa + vent * period_s) / (fill + vent) / SECONDS_PER_US;
+    const bool still_open = loop->open_at_us < start_us && loop->close_at_us > start_us;
+    const float pulse_us =
+        still_open ? pulse_from_open(parameters, fill_us) : pulse_from_closed(parameters, fill_us);
+    loop->duty_next = real_clamp(pulse_us / (float)period_us, 0.0f, 1.0f);
+    return loop->duty_next;
+}
+
+void pressure_loop_vent(struct pressure_loop *loop, const struct pressure_loop_parameters *parameters,
+                        int64_t time_us) {
+    loop->duty_next = 0.0f;
+    loop->duty = 0.0f;
+    loop->close_at_us = least(loop->close_at_us, time_us + parameters->close_delay_us);
+}
