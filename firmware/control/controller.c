@@ -12,7 +12,7 @@
 
 void controller_default_parameters(struct controller_parameters *parameters, const struct bend_table *table) {
     *parameters = (struct controller_parameters){
-        .tip_period_us = 10000, .tip_overdue_us = 5000, .command_timeout_us = 500000};
+        .tip_period_us = 10000, .tip_overdue_us = 5000, .command_timeout_us = 500000, .idle_pressure_pa = 800.0f};
     pressure_loop_default_parameters(&parameters->pressure_loop);
     tip_loop_default_parameters(&parameters->tip_loop);
     limits_default_parameters(&parameters->limits, table);
@@ -195,9 +195,11 @@ static void aim_at_bend(struct controller *controller) {
     const bool none = !(command->bend_rad > 0.0f);
     const struct bend_inverse_request request = {none ? 0.0f : real_hypot(x, y), real_atan2(y, x),
                                                  command->co_contraction_pa};
-    bend_inverse_solve(controller->table, &request, controller->status.pressure_target_pa, &controller->status.inverse);
+    bend_inverse_solve(controller->table, &request, controller->status.inverse.pressure_pa, &controller->status.inverse);
     for (uint32_t c = 0; c < 3u; c++) {
-        controller->status.pressure_target_pa[c] = controller->status.inverse.pressure_pa[c];
+        const float wanted_pa = controller->status.inverse.pressure_pa[c];
+        const bool idle = wanted_pa < controller->parameters.idle_pressure_pa && wanted_pa > command->co_contraction_pa;
+        controller->status.pressure_target_pa[c] = idle ? command->co_contraction_pa : wanted_pa;
     }
 }
 

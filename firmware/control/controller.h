@@ -36,6 +36,8 @@ struct controller_parameters {
     int64_t tip_period_us;       /* expected; a sample overdue by tip_overdue_us opens the tip loop */
     int64_t tip_overdue_us;
     int64_t command_timeout_us;
+    float idle_pressure_pa; /* bend commands leave a chamber alone that wants less than this over the co-contraction: it
+                               bends by under 0.15 degrees, but a pulse of the valve into so stiff a chamber is felt */
     struct pressure_loop_parameters pressure_loop;
     struct tip_loop_parameters tip_loop;
     struct limits_parameters limits;

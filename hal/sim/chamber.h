@@ -1,0 +1,46 @@
+/* The three chambers' gas: ISO 6358 flow in and out, isothermal ideal gas in a volume that follows the pressures.
+ *
+ * The state is p_abs V of each chamber with its tube (Pa m3, the gas mass but for R T); pressures follow from it and the
+ * table's volumes. Beyond the table's axes volumes go on linearly. */
+#ifndef TRIBEND_SIM_CHAMBER_H
+#define TRIBEND_SIM_CHAMBER_H
+
+#include "control/bend_table.h"
+#include "sim/valve.h"
+
+struct gas_parameters {
+    double ambient_pa_abs;
+    double temperature_k;
+    double gas_constant;          /* J/(kg K) */
+    double sonic_conductance;     /* m3/(s Pa) at the reference density */
+    double reference_density_kgpm3;
+    double critical_ratio;
+    double tube_volume_m3;
+};
+
+struct chambers {
+    double pressure_pa[3];  /* gauge */
+    double volume_m3[3];    /* chamber and tube */
+    double gas[3];          /* p_abs V, Pa m3 */
+    double capacity[3][3];  /* d gas_i / d p_j, m3 */
+};
+
+/* What effects may change for a step: nominal one and zero. */
+struct chamber_influence {
+    double conductance_scale[3];
+    double leak_conductance[3]; /* to ambient, m3/(s Pa) */
+    double supply_pa;
+};
+
+/* Mass flow from upstream to downstream, kg/s (ISO 6358-1:2013); negative pressures differences give zero. */
+double gas_mass_flow(const struct gas_parameters *parameters, double conductance, double up_pa_abs, double down_pa_abs);
+void chambers_init(struct chambers *chambers, const struct gas_parameters *parameters, const struct bend_table *table);
+/* From `from_us` to `to_us` (at most a millisecond or so). `supply_open`: the shut-off valve. */
+void chambers_step(struct chambers *chambers, const struct gas_parameters *parameters, const struct bend_table *table,
+                   const struct valve valve[3], const struct chamber_influence *influence, bool supply_open,
+                   int64_t from_us, int64_t to_us);
+/* A channel at any pressures: inside the axes the table, outside its tangent there. `gradient` may be NULL. */
+double table_extrapolated(const struct bend_table *table, const double pressure_pa[3], enum bend_table_channel channel,
+                          double gradient[3]);
+
+#endif
