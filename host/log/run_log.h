@@ -1,0 +1,50 @@
+/* Run logs: CSV with `# tribend-run 1` on the first line, `# key: value` lines, a header and rows. Columns may be missing
+ * and fields empty (not measured in that row); SI units. */
+#ifndef TRIBEND_RUN_LOG_H
+#define TRIBEND_RUN_LOG_H
+
+#include "link/link.h"
+#include "output/output_file.h"
+
+#define RUN_LOG_COLUMNS_MAX 64
+#define RUN_LOG_NAME_BYTES 32
+#define RUN_LOG_KEY_BYTES 256
+
+/* --- writing --- */
+
+struct run_log_writer {
+    struct output_file file;
+};
+
+struct run_log_metadata {
+    const char *module;
+    uint64_t table_hash;
+    double rate_hz;
+    const char *note;
+};
+
+bool run_log_create(struct run_log_writer *writer, const char *path, const struct run_log_metadata *metadata,
+                    char *error, size_t error_bytes);
+/* One row; `command` is the one being followed (bend columns stay empty for others). */
+void run_log_append(struct run_log_writer *writer, const struct link_report *report,
+                    const struct controller_command *command);
+bool run_log_finish(struct run_log_writer *writer, char *error, size_t error_bytes);
+void run_log_discard(struct run_log_writer *writer);
+
+/* --- reading --- */
+
+struct run_log {
+    size_t rows;
+    size_t columns;
+    char name[RUN_LOG_COLUMNS_MAX][RUN_LOG_NAME_BYTES];
+    double *value; /* [row * columns + column]; NaN where empty; states as enum supervisor_state */
+    char module[RUN_LOG_KEY_BYTES];
+};
+
+/* False: `error` names file, line and what is wrong. */
+bool run_log_read(const char *path, struct run_log *log, char *error, size_t error_bytes);
+void run_log_free(struct run_log *log);
+/* Index of a column, or -1. */
+int run_log_column(const struct run_log *log, const char *name);
+
+#endif
