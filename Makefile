@@ -11,6 +11,7 @@ SHELL    := /bin/bash
 .DEFAULT_GOAL := help
 .DELETE_ON_ERROR:
 MAKEFLAGS += --no-builtin-rules
+include tests/tools/build.mk
 
 .PHONY: help setup all demo test bench lint format tables clean
 
@@ -41,10 +42,8 @@ lint: ## warnings as errors with gcc, clang and the ARM compiler; cppcheck; clan
 format: ## clang-format every C file
 	@clang-format -i $(ALL_C) $(ALL_H)
 
-tables: all ## rebuild the reference table tables/paper-semicircle.tbt from its module and material
+tables: $(BUILD)/tribend-tables ## rebuild the reference table tables/paper-semicircle.tbt from its module and material
 	$(BUILD)/tribend-tables build tables/modules/paper-semicircle.yaml -o tables/paper-semicircle.tbt
 
 clean: ## remove what was built
 	rm -rf build build-sanitize $(BUILD)
-
-include tests/tools/build.mk

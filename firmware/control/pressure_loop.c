@@ -4,7 +4,7 @@
 
 #define SECONDS_PER_US 1e-6f
 #define INNOVATION_SHARE 0.0625f
-#define INNOVATION_SIGMAS 0.54f /* three sigma of an average over 1/16: 3 sqrt(1/31) of one sample's */
+#define INNOVATION_SIGMAS 0.81f /* 4.5 sigma of an average over 1/16, sqrt(1/31) of one sample's: once in minutes by chance */
 #define CLIPPED_SIGMAS 3.0f     /* closer to zero than this, readings are clipped and say little */
 #define PULSE_MARGIN_US 100.0f  /* a pulse is this much longer than the open delay, or left out */
 #define CAPACITY_LEAST_M3 1e-6f

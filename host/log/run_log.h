@@ -4,7 +4,7 @@
 #define TRIBEND_RUN_LOG_H
 
 #include "link/link.h"
-#include "output/output_file.h"
+#include "program/output_file.h"
 
 #define RUN_LOG_COLUMNS_MAX 64
 #define RUN_LOG_NAME_BYTES 32

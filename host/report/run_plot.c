@@ -4,7 +4,7 @@
 #include <string.h>
 
 #include "control/tip_loop.h"
-#include "output/gnuplot.h"
+#include "program/gnuplot.h"
 
 #define DEGREES (180.0 / M_PI)
 #define DIRECTION_LEAST_BEND_RAD 0.01 /* of a straighter tip the direction is noise */

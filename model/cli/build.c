@@ -30,7 +30,7 @@ static const struct argp_option options[] = {
 
 static error_t parse(int key, char *argument, struct argp_state *state) {
     struct arguments *arguments = state->input;
-    char error[CLI_ERROR_BYTES], *end = NULL;
+    char error[PROGRAM_ERROR_BYTES], *end = NULL;
     switch (key) {
     case 'o':
         arguments->output = argument;
@@ -94,26 +94,26 @@ static double seconds(void) {
 }
 
 static int run(struct arguments *arguments) {
-    char path[CLI_PATH_BYTES], message[CLI_ERROR_BYTES], output[CLI_PATH_BYTES];
+    char path[PROGRAM_PATH_BYTES], message[PROGRAM_ERROR_BYTES], output[PROGRAM_PATH_BYTES];
     struct module_description module;
     struct description_error error;
     struct table_image image;
     bool terminal = isatty(STDERR_FILENO) != 0;
     cli_module_path(arguments->module, path);
     if (!module_description_read(path, arguments->material, &module, &error)) {
-        return cli_fail(EXIT_BAD_INPUT, "%s", error.text);
+        return program_fail(EXIT_BAD_INPUT, "%s", error.text);
     }
     (void)snprintf(output, sizeof output, "%s%s", arguments->output != NULL ? arguments->output : module.name,
                    arguments->output != NULL ? "" : ".tbt");
     cli_print_material(&module.material);
     (void)fflush(stdout);
-    cli_catch_interrupt();
-    arguments->build.stop = &cli_interrupted;
+    program_catch_interrupt();
+    arguments->build.stop = &program_interrupted;
     arguments->build.progress = arguments->quiet ? NULL : show_progress;
     arguments->build.context = &terminal;
     const double start_s = seconds();
     if (!table_build(&module, &arguments->build, &image, &error)) {
-        return cli_fail(EXIT_SOLVER, "%s%s", terminal ? "\n" : "", error.text);
+        return program_fail(EXIT_SOLVER, "%s%s", terminal ? "\n" : "", error.text);
     }
     const bool written = table_image_write(&image, output, message, sizeof message);
     if (written) {
@@ -121,7 +121,7 @@ static int run(struct arguments *arguments) {
                image.solved, image.no_equilibrium, image.size, seconds() - start_s);
     }
     table_image_free(&image);
-    return written ? EXIT_OK : cli_fail(EXIT_OUTPUT, "%s", message);
+    return written ? EXIT_OK : program_fail(EXIT_OUTPUT, "%s", message);
 }
 
 int cli_build(int argc, char **argv) {

@@ -6,8 +6,8 @@
 
 #include "cli/cli.h"
 #include "material/material_fit.h"
-#include "output/gnuplot.h"
-#include "output/output_file.h"
+#include "program/gnuplot.h"
+#include "program/output_file.h"
 
 struct law_choice {
     const char *name;
@@ -166,24 +166,24 @@ int cli_fit(int argc, char **argv) {
     struct arguments arguments = {.law = &laws[2], .strain_max = 3.0};
     struct tensile_test test;
     struct material_fit fit;
-    char message[CLI_ERROR_BYTES];
+    char message[PROGRAM_ERROR_BYTES];
     argp_err_exit_status = EXIT_USAGE;
     if (argp_parse(&parser, argc, argv, 0, NULL, &arguments) != 0) {
         return EXIT_USAGE;
     }
     if (!tensile_test_read(arguments.path, &test, message, sizeof message)) {
-        return cli_fail(EXIT_BAD_INPUT, "%s", message);
+        return program_fail(EXIT_BAD_INPUT, "%s", message);
     }
     int code = EXIT_OK;
     if (!material_fit(&test, arguments.law->law, arguments.law->terms, arguments.strain_max, &fit, message,
                       sizeof message)) {
-        code = cli_fail(EXIT_BAD_INPUT, "%s: %s", arguments.path, message);
+        code = program_fail(EXIT_BAD_INPUT, "%s: %s", arguments.path, message);
     } else {
         print_fit(&fit);
         if (arguments.output != NULL && !write_yaml(&arguments, &fit, message, sizeof message)) {
-            code = cli_fail(EXIT_OUTPUT, "%s", message);
+            code = program_fail(EXIT_OUTPUT, "%s", message);
         } else if (arguments.plot != NULL && !draw(&arguments, &test, &fit, message, sizeof message)) {
-            code = cli_fail(EXIT_OUTPUT, "%s", message);
+            code = program_fail(EXIT_OUTPUT, "%s", message);
         }
     }
     tensile_test_free(&test);

@@ -4,8 +4,8 @@
 #include <stdio.h>
 
 #include "cli/cli.h"
-#include "cli/table_file.h"
-#include "output/gnuplot.h"
+#include "program/table_file.h"
+#include "program/gnuplot.h"
 
 #define DEGREES (180.0 / M_PI)
 #define CURVE_POINTS 200
@@ -111,7 +111,7 @@ int cli_plot(int argc, char **argv) {
     struct arguments arguments = {NULL, NULL};
     struct table_file file;
     struct gnuplot plot;
-    char output[CLI_PATH_BYTES + 8], message[CLI_ERROR_BYTES];
+    char output[PROGRAM_PATH_BYTES + 8], message[PROGRAM_ERROR_BYTES];
     argp_err_exit_status = EXIT_USAGE;
     if (argp_parse(&parser, argc, argv, 0, NULL, &arguments) != 0) {
         return EXIT_USAGE;
@@ -123,14 +123,14 @@ int cli_plot(int argc, char **argv) {
     (void)snprintf(output, sizeof output, "%s%s", arguments.output != NULL ? arguments.output : arguments.path,
                    arguments.output != NULL ? "" : ".png");
     if (!gnuplot_open(&plot, output, 1400, 700, message, sizeof message)) {
-        code = cli_fail(EXIT_OUTPUT, "%s", message);
+        code = program_fail(EXIT_OUTPUT, "%s", message);
     } else {
         fputs("set multiplot layout 1,2\n", plot.script);
         draw_curves(plot.script, &file.table);
         draw_plane(plot.script, &file.table);
         fputs("unset multiplot\n", plot.script);
         if (!gnuplot_close(&plot, message, sizeof message)) {
-            code = cli_fail(EXIT_OUTPUT, "%s", message);
+            code = program_fail(EXIT_OUTPUT, "%s", message);
         } else {
             printf("wrote %s\n", output);
         }

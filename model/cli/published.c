@@ -44,7 +44,7 @@ static bool keep_greatest(void *context, const struct section_state *state) {
     if (state->pressure_pa[0] > greatest->pressure_pa[0]) {
         *greatest = *state;
     }
-    return cli_interrupted == 0;
+    return program_interrupted == 0;
 }
 
 static void solve_to(const struct module_description *module, enum section_goal goal, double value,
@@ -225,7 +225,7 @@ static double ogden_uniaxial_pa(double stretch) {
 
 static void print_ecoflex_0050(const struct material *ecoflex_0030) {
     double strain[61], stress_pa[61];
-    char message[CLI_ERROR_BYTES], ours[96];
+    char message[PROGRAM_ERROR_BYTES], ours[96];
     struct material_fit fit;
     for (size_t i = 0; i < 61; i++) {
         strain[i] = 0.05 * (double)i;
@@ -285,13 +285,13 @@ int cli_published(int argc, char **argv) {
     const struct material positive = polynomial("ecoflex-0030-positive", 3, 5072.0, 331.0, 15.0);
     printf("Elsayed et al. 2014 against the section solver, Ecoflex 0030 with every printed sign taken as positive.\n\n");
     row("figure", "paper", "ours", "verdict", "reason");
-    cli_catch_interrupt();
+    program_catch_interrupt();
     print_materials();
     print_bends(&positive);
     print_trends(&positive);
     print_ecoflex_0050(&positive);
-    if (cli_interrupted != 0) {
-        return cli_fail(EXIT_SOLVER, "interrupted");
+    if (program_interrupted != 0) {
+        return program_fail(EXIT_SOLVER, "interrupted");
     }
     print_silent();
     return EXIT_OK;

@@ -3,7 +3,7 @@
 #include <math.h>
 #include <stdlib.h>
 
-#include "output/gnuplot.h"
+#include "program/gnuplot.h"
 #include "section/section_mesh.h"
 
 #define DEGREES (180.0 / M_PI)

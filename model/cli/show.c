@@ -5,7 +5,7 @@
 #include <stdio.h>
 
 #include "cli/cli.h"
-#include "cli/table_file.h"
+#include "program/table_file.h"
 #include "control/bend_table_format.h"
 
 #define DEGREES (180.0 / M_PI)

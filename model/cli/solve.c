@@ -7,7 +7,7 @@
 
 #include "cli/cli.h"
 #include "cli/section_plot.h"
-#include "output/output_file.h"
+#include "program/output_file.h"
 #include "section/section_solver.h"
 #include "units/units.h"
 
@@ -51,7 +51,7 @@ static error_t parse_chambers(struct argp_state *state, const char *list, bool c
 
 static error_t parse(int key, char *argument, struct argp_state *state) {
     struct arguments *arguments = state->input;
-    char error[CLI_ERROR_BYTES];
+    char error[PROGRAM_ERROR_BYTES];
     switch (key) {
     case 'm':
         arguments->material = argument;
@@ -131,7 +131,7 @@ static bool take_point(void *context, const struct section_state *state) {
         print_row(report, state);
     }
     report->points++;
-    return cli_interrupted == 0;
+    return program_interrupted == 0;
 }
 
 static bool parse_goal(const char *text, double active_length_m, enum section_goal *goal, double *value, char *error,
@@ -168,9 +168,9 @@ static int solve(const struct arguments *arguments, const struct module_descript
         report.loaded = arguments->chamber[c] ? c : report.loaded;
     }
     report.rest_area_m2 = section_solver_chamber_area_m2(solver, report.loaded);
-    char message[CLI_ERROR_BYTES];
+    char message[PROGRAM_ERROR_BYTES];
     if (!parse_goal(arguments->to, report.active_length_m, &goal, &value, message, sizeof message)) {
-        return cli_fail(EXIT_USAGE, "--to: %s", message);
+        return program_fail(EXIT_USAGE, "--to: %s", message);
     }
     if (csv != NULL) {
         fputs("pressure_pa,bend_rad,curvature_1pm,stretch,volume_ratio,width_bend_plane_m,width_across_m,"
@@ -184,10 +184,10 @@ static int solve(const struct arguments *arguments, const struct module_descript
                "volume", "in plane", "across", "von Mises", "greatest", "Pa", "deg", "", "ratio", "width mm", "width mm",
                "apex kPa", "stretch");
     }
-    cli_catch_interrupt();
+    program_catch_interrupt();
     if (!section_solver_path(solver, direction_pa, goal, value, take_point, &report, &error)) {
-        return cli_fail(EXIT_SOLVER, "%s: %s", module->name,
-                        cli_interrupted != 0 ? "interrupted; nothing was written" : error.text);
+        return program_fail(EXIT_SOLVER, "%s: %s", module->name,
+                        program_interrupted != 0 ? "interrupted; nothing was written" : error.text);
     }
     if (arguments->quiet || (report.points - 1) % ROWS_SHOWN_EVERY != 0) {
         struct section_state state;
@@ -196,18 +196,18 @@ static int solve(const struct arguments *arguments, const struct module_descript
     }
     if (arguments->plot != NULL &&
         !section_plot(arguments->plot, module, mesh, solver, message, sizeof message)) {
-        return cli_fail(EXIT_OUTPUT, "%s", message);
+        return program_fail(EXIT_OUTPUT, "%s", message);
     }
     return EXIT_OK;
 }
 
 static int run(const struct arguments *arguments) {
-    char path[CLI_PATH_BYTES], message[CLI_ERROR_BYTES];
+    char path[PROGRAM_PATH_BYTES], message[PROGRAM_ERROR_BYTES];
     struct module_description module;
     struct description_error error;
     cli_module_path(arguments->module, path);
     if (!module_description_read(path, arguments->material, &module, &error)) {
-        return cli_fail(EXIT_BAD_INPUT, "%s", error.text);
+        return program_fail(EXIT_BAD_INPUT, "%s", error.text);
     }
     const struct section_mesh_options mesh_options = {.size_m = arguments->mesh_size_m};
     struct section_mesh *mesh = section_mesh_create(&module, &mesh_options, &error);
@@ -215,14 +215,14 @@ static int run(const struct arguments *arguments) {
     struct output_file csv = {.stream = NULL};
     int code = EXIT_OK;
     if (solver == NULL) {
-        code = cli_fail(EXIT_SOLVER, "%s", error.text);
+        code = program_fail(EXIT_SOLVER, "%s", error.text);
     } else if (arguments->csv != NULL && !output_file_open(&csv, arguments->csv, message, sizeof message)) {
-        code = cli_fail(EXIT_OUTPUT, "%s", message);
+        code = program_fail(EXIT_OUTPUT, "%s", message);
     } else {
         code = solve(arguments, &module, mesh, solver, csv.stream);
     }
     if (code == EXIT_OK && csv.stream != NULL && !output_file_commit(&csv, message, sizeof message)) {
-        code = cli_fail(EXIT_OUTPUT, "%s", message);
+        code = program_fail(EXIT_OUTPUT, "%s", message);
     }
     output_file_discard(&csv);
     section_solver_free(solver);

@@ -9,7 +9,7 @@
 
 #include "control/bend_table.h"
 #include "control/bend_table_format.h"
-#include "output/output_file.h"
+#include "program/output_file.h"
 #include "section/section_solver.h"
 
 _Static_assert(__BYTE_ORDER__ == __ORDER_LITTLE_ENDIAN__, "the image is written in the host's byte order");

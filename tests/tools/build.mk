@@ -10,7 +10,7 @@ LINT_PACKAGES  := clang clang-tidy cppcheck gcc-arm-none-eabi libnewlib-arm-none
 FIRMWARE_C := $(wildcard firmware/*.c firmware/*/*.c)
 SIM_C      := $(wildcard hal/sim/*.c hal/sim/effects/*.c)
 MODEL_C    := $(filter-out model/cli/%,$(wildcard model/*/*.c))
-UNITS_C    := $(wildcard model/units/*.c model/output/*.c)
+SHARED_C    := $(wildcard model/units/*.c model/program/*.c)
 TABLES_CLI_C := $(wildcard model/cli/*.c)
 HOST_C     := $(filter-out host/cli/main.c,$(wildcard host/*/*.c))
 HOST_MAIN  := host/cli/main.c
@@ -37,7 +37,7 @@ object = $(patsubst %.c,$(BUILD)/%.o,$(1))
 FIRMWARE_O := $(call object,$(FIRMWARE_C))
 SIM_O      := $(call object,$(SIM_C))
 MODEL_O    := $(call object,$(MODEL_C))
-UNITS_O    := $(call object,$(UNITS_C))
+SHARED_O    := $(call object,$(SHARED_C))
 TABLES_CLI_O := $(call object,$(TABLES_CLI_C))
 HOST_O     := $(call object,$(HOST_C))
 SUPPORT_O  := $(call object,$(SUPPORT_C))
@@ -48,21 +48,24 @@ BENCH_PROGRAMS := $(patsubst %.c,$(BUILD)/%,$(BENCH_C))
 
 MODEL_LIBS := -lgmsh -lcholmod -lgsl -lgslcblas -lcyaml -lyaml -lz -fopenmp -lm
 
+# V=1 shows the commands in full.
+say = $(if $(V),,@echo '  cc $<';)
+
 $(BUILD)/firmware/%.o: firmware/%.c
 	@mkdir -p $(@D)
-	$(CC) $(OPTIMISE) $(SANITIZE_FLAGS) $(FIRMWARE_FLAGS) -MMD -MP -c $< -o $@
+	$(say)$(CC) $(OPTIMISE) $(SANITIZE_FLAGS) $(FIRMWARE_FLAGS) -MMD -MP -c $< -o $@
 $(BUILD)/model/%.o: model/%.c
 	@mkdir -p $(@D)
-	$(CC) $(OPTIMISE) $(SANITIZE_FLAGS) $(MODEL_FLAGS) -MMD -MP -c $< -o $@
+	$(say)$(CC) $(OPTIMISE) $(SANITIZE_FLAGS) $(MODEL_FLAGS) -MMD -MP -c $< -o $@
 $(BUILD)/%.o: %.c
 	@mkdir -p $(@D)
-	$(CC) $(OPTIMISE) $(SANITIZE_FLAGS) $(COMMON_FLAGS) -MMD -MP -c $< -o $@
+	$(say)$(CC) $(OPTIMISE) $(SANITIZE_FLAGS) $(COMMON_FLAGS) -MMD -MP -c $< -o $@
 
-link = $(CC) $(SANITIZE_FLAGS) $(filter %.o,$^) -o $@
+link = $(if $(V),,@echo '  link $@';) $(CC) $(SANITIZE_FLAGS) $(filter %.o,$^) -o $@
 
 $(BUILD)/tribend-tables: $(TABLES_CLI_O) $(MODEL_O) $(FIRMWARE_O)
 	$(link) $(MODEL_LIBS)
-$(BUILD)/tribend: $(call object,$(HOST_MAIN)) $(HOST_O) $(SIM_O) $(FIRMWARE_O) $(UNITS_O)
+$(BUILD)/tribend: $(call object,$(HOST_MAIN)) $(HOST_O) $(SIM_O) $(FIRMWARE_O) $(SHARED_O)
 	$(link) -lm
 
 .PHONY: test-programs bench-programs
@@ -74,7 +77,7 @@ $(BUILD)/tests/model/test_%: $(BUILD)/tests/model/test_%.o $(SUPPORT_O) $(MODEL_
 	$(link) -lcmocka $(MODEL_LIBS)
 $(BUILD)/tests/bench/bench_model: $(BUILD)/tests/bench/bench_model.o $(MODEL_O) $(FIRMWARE_O)
 	$(link) $(MODEL_LIBS)
-$(BUILD)/tests/%: $(BUILD)/tests/%.o $(SUPPORT_O) $(HOST_O) $(SIM_O) $(FIRMWARE_O) $(UNITS_O)
+$(BUILD)/tests/%: $(BUILD)/tests/%.o $(SUPPORT_O) $(HOST_O) $(SIM_O) $(FIRMWARE_O) $(SHARED_O)
 	$(link) -lcmocka -lm
 
 .SECONDARY:

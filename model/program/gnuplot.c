@@ -1,4 +1,4 @@
-#include "output/gnuplot.h"
+#include "program/gnuplot.h"
 
 #include <errno.h>
 #include <string.h>

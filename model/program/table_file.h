@@ -1,4 +1,4 @@
-/* A bend table read from a file and checked, for `show` and `plot`. */
+/* A bend table read from a file and checked. */
 #ifndef TRIBEND_TABLE_FILE_H
 #define TRIBEND_TABLE_FILE_H
 

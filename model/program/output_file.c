@@ -1,4 +1,4 @@
-#include "output/output_file.h"
+#include "program/output_file.h"
 
 #include <errno.h>
 #include <string.h>

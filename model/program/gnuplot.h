@@ -2,7 +2,7 @@
 #ifndef TRIBEND_GNUPLOT_H
 #define TRIBEND_GNUPLOT_H
 
-#include "output/output_file.h"
+#include "program/output_file.h"
 
 struct gnuplot {
     FILE *script;

@@ -1,0 +1,57 @@
+/* What the subcommands of `tribend` share: their options and the course of a run. */
+#ifndef TRIBEND_HOST_CLI_H
+#define TRIBEND_HOST_CLI_H
+
+#include <argp.h>
+
+#include "link/sim_drill.h"
+#include "link/sim_link.h"
+#include "program/program.h"
+#include "program/table_file.h"
+
+/* Each returns an exit code. `argv[0]` is the name of the program with the subcommand. */
+int cli_bend(int argc, char **argv);
+int cli_pressure(int argc, char **argv);
+int cli_status(int argc, char **argv);
+int cli_plot(int argc, char **argv);
+
+/* Options of every subcommand that talks to a controller. */
+struct bus_options {
+    const char *bus;
+    const char *table;  /* NULL: $TRIBEND_TABLE, else the reference table */
+    const char *module; /* the module that the table must be of; NULL: any */
+    const char *record;
+    uint64_t seed;
+    double duration_s;
+    bool quiet;
+    struct effect effect[SIM_EFFECTS_MAX];
+    size_t effect_count;
+    struct sim_drill drill;
+};
+
+/* For argp's children; its input is a struct bus_options. */
+extern const struct argp bus_options_parser;
+void bus_options_init(struct bus_options *options);
+/* argp's key for every argument of ours that is a quantity: parse or say what was expected. */
+void cli_quantity(struct argp_state *state, const char *what, int kind, const char *text, double *value);
+
+/* A controller that is reached, and the table that goes with it. */
+struct bus {
+    struct table_file file;
+    struct sim_link sim;
+    struct link link;
+    const char *table_path;
+    char found[PROGRAM_PATH_BYTES];
+};
+
+/* Returns an exit code, with the message printed. */
+int bus_open(struct bus *bus, const struct bus_options *options);
+void bus_close(struct bus *bus);
+
+/* Follow `command` for the options' duration, vent, say how it went; returns an exit code. */
+int run_command(const struct bus_options *options, const struct controller_command *command);
+/* "overpressure, command timeout": the faults' or warnings' words into `text`. */
+void cli_describe_faults(uint32_t faults, char *text, size_t bytes);
+void cli_describe_warnings(uint32_t warnings, char *text, size_t bytes);
+
+#endif

@@ -1,0 +1,12 @@
+/* `tribend`: command a module, simulated or real, and look at what it did. One file a subcommand. */
+#include "cli/commands.h"
+
+static const struct program_subcommand subcommands[] = {
+    {"bend", cli_bend, "bend the tip to an angle in a direction, in closed loop"},
+    {"pressure", cli_pressure, "hold three chamber pressures"},
+    {"status", cli_status, "say what the controller sees and which faults it has"},
+    {"plot", cli_plot, "draw a recorded run"}};
+
+int main(int argc, char **argv) {
+    return program_run("tribend", subcommands, sizeof subcommands / sizeof subcommands[0], argc, argv);
+}

@@ -1,0 +1,160 @@
+/* Options and the opening of a bus, common to the subcommands that talk to a controller. */
+#include <errno.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "cli/commands.h"
+#include "units/units.h"
+
+#define REFERENCE_TABLE "tables/paper-semicircle.tbt"
+#define DURATION_MOST_S 86400.0
+
+static const struct argp_option option_list[] = {
+    {"for", 'f', "TIME", 0, "how long, such as 5s (default 5s)", 1},
+    {"bus", 'b', "BUS", 0, "where the controller is: sim, controller and plant in this process (default)", 1},
+    {"table", 't', "FILE", 0, "bend table (default $TRIBEND_TABLE, else " REFERENCE_TABLE ")", 1},
+    {"module", 'm', "NAME", 0, "refuse a table of any other module", 1},
+    {"record", 'r', "FILE", 0, "write a run log (CSV)", 1},
+    {"seed", 's', "N", 0, "of the simulation's noise (default 1)", 2},
+    {"effect", 'e', "NAME[:P=V,..]", 0, "add a real-world effect to the plant; may be repeated", 2},
+    {"drill", 'd', "FAULT@TIME", 0, "put a fault into the simulation, such as tip-lost@2s", 2},
+    {"quiet", 'q', NULL, 0, "no progress lines", 1},
+    {0}};
+
+void cli_quantity(struct argp_state *state, const char *what, int kind, const char *text, double *value) {
+    char error[PROGRAM_ERROR_BYTES];
+    if (!units_parse((enum units_kind)kind, text, value, error, sizeof error)) {
+        argp_error(state, "%s: %s", what, error);
+    }
+}
+
+static void parse_duration(struct argp_state *state, const char *text, struct bus_options *options) {
+    cli_quantity(state, "--for", UNITS_TIME, text, &options->duration_s);
+    if (!(options->duration_s > 0.0) || !(options->duration_s <= DURATION_MOST_S)) {
+        argp_error(state, "--for: %s is not between 0 and a day", text);
+    }
+}
+
+static void parse_seed(struct argp_state *state, const char *text, struct bus_options *options) {
+    char *end = NULL;
+    errno = 0;
+    options->seed = strtoull(text, &end, 10);
+    if (errno != 0 || end == text || *end != '\0' || strchr(text, '-') != NULL) {
+        argp_error(state, "--seed: '%s' is not a whole number from 0 on", text);
+    }
+}
+
+static void parse_effect(struct argp_state *state, const char *text, struct bus_options *options) {
+    char error[PROGRAM_ERROR_BYTES];
+    if (options->effect_count == SIM_EFFECTS_MAX) {
+        argp_error(state, "--effect: at most %d effects", SIM_EFFECTS_MAX);
+    } else if (!effect_parse(text, &options->effect[options->effect_count++], error, sizeof error)) {
+        argp_error(state, "--effect: %s", error);
+    }
+}
+
+static error_t parse(int key, char *argument, struct argp_state *state) {
+    struct bus_options *options = state->input;
+    char error[PROGRAM_ERROR_BYTES];
+    switch (key) {
+    case 'f':
+        parse_duration(state, argument, options);
+        return 0;
+    case 'b':
+        options->bus = argument;
+        if (strcmp(argument, "sim") != 0) {
+            argp_error(state, "--bus: there is no bus '%s'; there is: sim", argument);
+        }
+        return 0;
+    case 't':
+        options->table = argument;
+        return 0;
+    case 'm':
+        options->module = argument;
+        return 0;
+    case 'r':
+        options->record = argument;
+        return 0;
+    case 's':
+        parse_seed(state, argument, options);
+        return 0;
+    case 'e':
+        parse_effect(state, argument, options);
+        return 0;
+    case 'd':
+        if (!sim_drill_parse(argument, &options->drill, error, sizeof error)) {
+            argp_error(state, "--drill: %s", error);
+        }
+        return 0;
+    case 'q':
+        options->quiet = true;
+        return 0;
+    default:
+        return ARGP_ERR_UNKNOWN;
+    }
+}
+
+const struct argp bus_options_parser = {.options = option_list, .parser = parse};
+
+void bus_options_init(struct bus_options *options) {
+    memset(options, 0, sizeof *options);
+    options->bus = "sim";
+    options->seed = 1;
+    options->duration_s = 5.0;
+}
+
+int bus_open(struct bus *bus, const struct bus_options *options) {
+    bus->table_path = options->table != NULL ? options->table : getenv("TRIBEND_TABLE");
+    if (bus->table_path == NULL || *bus->table_path == '\0') {
+        program_find(REFERENCE_TABLE, bus->found);
+        bus->table_path = bus->found;
+    }
+    const int code = table_file_open(&bus->file, bus->table_path, options->module);
+    if (code != EXIT_OK) {
+        return code;
+    }
+    sim_link_open(&bus->sim, &bus->file.table, options->seed, &bus->link);
+    for (size_t i = 0; i < options->effect_count; i++) {
+        if (!sim_add_effect(&bus->sim.sim, &options->effect[i])) {
+            bus_close(bus);
+            return program_fail(EXIT_USAGE, "the simulation has no room for effect '%s'",
+                                options->effect[i].kind->name);
+        }
+    }
+    return EXIT_OK;
+}
+
+void bus_close(struct bus *bus) {
+    bus->link.close(bus->link.context);
+    table_file_close(&bus->file);
+}
+
+static void append(char *text, size_t bytes, const char *word) {
+    const size_t used = strlen(text);
+    (void)snprintf(text + used, bytes - used, "%s%s", used > 0 ? ", " : "", word);
+}
+
+void cli_describe_faults(uint32_t faults, char *text, size_t bytes) {
+    *text = '\0';
+    for (int f = 0; f < (int)FAULT_COUNT; f++) {
+        if ((faults & (1u << (unsigned)f)) != 0u) {
+            append(text, bytes, supervisor_fault_describe((enum supervisor_fault)f)->name);
+        }
+    }
+    if (*text == '\0') {
+        append(text, bytes, "none");
+    }
+}
+
+void cli_describe_warnings(uint32_t warnings, char *text, size_t bytes) {
+    *text = '\0';
+    for (int w = 0; w < (int)WARNING_COUNT; w++) {
+        if ((warnings & (1u << (unsigned)w)) != 0u) {
+            append(text, bytes, supervisor_warning_text((enum supervisor_warning)w));
+        }
+    }
+    if (*text == '\0') {
+        append(text, bytes, "none");
+    }
+}

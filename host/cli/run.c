@@ -1,0 +1,227 @@
+/* The course of a command: wait until the controller is ready, send and repeat, vent, sum up. */
+#include <inttypes.h>
+#include <math.h>
+#include <stdio.h>
+#include <string.h>
+
+#include "cli/commands.h"
+#include "log/run_log.h"
+#include "report/run_summary.h"
+
+#define DEGREES (180.0 / M_PI)
+#define READY_WITHIN_US 2000000
+#define REPEAT_US 100000
+#define PROGRESS_US 500000
+#define VENT_WITHIN_US 10000000
+#define VENTED_PA 500.0f
+#define WORDS_BYTES 512
+
+struct run {
+    const struct bus_options *options;
+    struct bus *bus;
+    struct run_log_writer *log; /* NULL: not recorded */
+    struct controller_command command;
+    int64_t next_send_us;
+    int64_t next_progress_us;
+    struct run_summary summary;
+};
+
+static bool send(struct run *run, enum controller_command_kind kind, int64_t time_us) {
+    if (time_us < run->next_send_us || sim_drill_silences_host(&run->options->drill, time_us)) {
+        return true;
+    }
+    run->next_send_us = time_us + REPEAT_US;
+    run->command.kind = kind;
+    return run->bus->link.send(run->bus->link.context, &run->command);
+}
+
+/* One report, logged; false: the link is gone. */
+static bool receive(struct run *run, struct link_report *report) {
+    struct bus *bus = run->bus;
+    sim_drill_apply(&run->options->drill, &bus->sim, bus->file.bytes, bus->file.size);
+    if (!bus->link.receive(bus->link.context, report)) {
+        return false;
+    }
+    if (run->log != NULL) {
+        run_log_append(run->log, report, &run->command);
+    }
+    return true;
+}
+
+static void show_progress(struct run *run, const struct link_report *report) {
+    const struct controller_status *status = &report->status;
+    if (run->options->quiet || report->time_us < run->next_progress_us) {
+        return;
+    }
+    run->next_progress_us = report->time_us + PROGRESS_US;
+    printf("%6.1f s  %-8s bend %6.2f deg  toward %7.2f deg  pressures %6.2f %6.2f %6.2f kPa  targets %6.2f %6.2f %6.2f "
+           "kPa%s\n",
+           1e-6 * (double)report->time_us, supervisor_state_name(status->state), DEGREES * (double)status->bend_rad,
+           DEGREES * (double)status->direction_rad, 1e-3 * (double)report->pressure_pa[0],
+           1e-3 * (double)report->pressure_pa[1], 1e-3 * (double)report->pressure_pa[2],
+           1e-3 * (double)status->pressure_target_pa[0], 1e-3 * (double)status->pressure_target_pa[1],
+           1e-3 * (double)status->pressure_target_pa[2], status->bend_is_measured ? "" : "  (no tip: predicted)");
+    (void)fflush(stdout);
+}
+
+/* Until SAFE; an exit code. */
+static int wait_ready(struct run *run, struct link_report *report) {
+    do {
+        if (!receive(run, report)) {
+            return program_fail(EXIT_OUTPUT, "the controller on bus %s went away", run->options->bus);
+        }
+        if (report->status.state == SUPERVISOR_FAULT) {
+            return EXIT_FAULT;
+        }
+        if (report->time_us > READY_WITHIN_US) {
+            return program_fail(EXIT_FAULT, "the controller stayed in %s: do all chambers read under 2 kPa?",
+                                supervisor_state_name(report->status.state));
+        }
+    } while (report->status.state != SUPERVISOR_SAFE);
+    return EXIT_OK;
+}
+
+static int follow(struct run *run, const struct controller_command *command, struct link_report *report) {
+    const int64_t start_us = report->time_us;
+    const int64_t end_us = start_us + (int64_t)(1e6 * run->options->duration_s);
+    run->command = *command;
+    run_summary_start(&run->summary, command, start_us, end_us);
+    while (report->time_us < end_us && program_interrupted == 0) {
+        if (!send(run, command->kind, report->time_us) || !receive(run, report)) {
+            return program_fail(EXIT_OUTPUT, "the controller on bus %s went away", run->options->bus);
+        }
+        run_summary_add(&run->summary, report);
+        show_progress(run, report);
+        if (report->status.state == SUPERVISOR_FAULT) {
+            return EXIT_FAULT;
+        }
+    }
+    return program_interrupted == 0 ? EXIT_OK : EXIT_INTERRUPTED;
+}
+
+/* Vent, and watch the pressures go; true once they are gone. */
+static bool vent(struct run *run, struct link_report *report) {
+    const int64_t until_us = report->time_us + VENT_WITHIN_US;
+    const float *pressure_pa = report->status.pressure_estimate_pa;
+    bool vented = false;
+    run->command = (struct controller_command){.kind = COMMAND_VENT};
+    run->next_send_us = report->time_us;
+    while (!vented && report->time_us < until_us) {
+        if (!send(run, COMMAND_VENT, report->time_us) || !receive(run, report)) {
+            return false;
+        }
+        vented = pressure_pa[0] < VENTED_PA && pressure_pa[1] < VENTED_PA && pressure_pa[2] < VENTED_PA;
+    }
+    return vented;
+}
+
+static void print_summary(const struct run_summary *summary, const struct link_report *last) {
+    const struct controller_command *command = &summary->command;
+    char words[WORDS_BYTES];
+    if (command->kind == COMMAND_BEND && summary->samples > 0) {
+        const double n = (double)summary->samples;
+        const double bend = DEGREES * summary->bend_sum_rad / n, turn = DEGREES * summary->direction_sum_rad / n;
+        printf("bend      %.2f deg, error %+.2f deg (rms %.2f deg)\n", bend, bend - DEGREES * (double)command->bend_rad,
+               DEGREES * sqrt(summary->bend_square_rad2 / n));
+        if (command->bend_rad > 0.0f) {
+            printf("direction %.2f deg, error %+.2f deg (rms %.2f deg)\n",
+                   DEGREES * (double)command->direction_rad + turn, turn,
+                   DEGREES * sqrt(summary->direction_square_rad2 / n));
+        }
+    }
+    if (summary->pressure_samples > 0) {
+        const double n = (double)summary->pressure_samples;
+        printf("pressures");
+        for (size_t c = 0; c < 3; c++) {
+            printf("%s %.3f kPa (rms error %.0f Pa)", c > 0 ? "," : "", 1e-3 * summary->pressure_sum_pa[c] / n,
+                   sqrt(summary->pressure_square_pa2[c] / n));
+        }
+        printf("\n");
+    }
+    const double settling_s = run_summary_settling_s(summary);
+    const char *band = command->kind == COMMAND_BEND ? "1 deg" : "0.2 kPa";
+    if (settling_s >= 0.0) {
+        printf("settled   within %s after %.2f s\n", band, settling_s);
+    } else {
+        printf("settled   not within %s\n", band);
+    }
+    cli_describe_warnings(last->status.warnings, words, sizeof words);
+    printf("warnings  %s\n", words);
+    printf("tip       %u samples, %u rejected, lost %u times; commands refused: %u\n", last->status.tip_samples,
+           last->status.tip_rejected, last->status.tip_lost_count, last->status.commands_refused);
+}
+
+static int explain_fault(const struct link_report *report) {
+    char words[WORDS_BYTES];
+    cli_describe_faults(report->status.faults, words, sizeof words);
+    (void)program_fail(EXIT_FAULT, "the controller vented and is in FAULT since %.3f s: %s",
+                       1e-6 * (double)report->time_us, words);
+    for (int f = 0; f < (int)FAULT_COUNT; f++) {
+        if ((report->status.faults & (1u << (unsigned)f)) != 0u) {
+            const struct supervisor_fault_row *row = supervisor_fault_describe((enum supervisor_fault)f);
+            fprintf(stderr, "  %s\n    seen by   %s\n    reaction  %s\n    remedy    %s\n", row->name, row->detector,
+                    row->reaction, row->clear);
+        }
+    }
+    return EXIT_FAULT;
+}
+
+static int run_on_bus(struct run *run, const struct controller_command *command) {
+    struct link_report report;
+    memset(&report, 0, sizeof report);
+    int code = wait_ready(run, &report);
+    if (code == EXIT_OK) {
+        code = follow(run, command, &report);
+    }
+    struct link_report last = report;
+    const int64_t vent_us = report.time_us;
+    const bool vented = vent(run, &report);
+    if (code == EXIT_FAULT) {
+        code = explain_fault(&last);
+    } else if (code == EXIT_OK || code == EXIT_INTERRUPTED) {
+        print_summary(&run->summary, &last);
+    }
+    if (code == EXIT_INTERRUPTED) {
+        printf("interrupted at %.2f s\n", 1e-6 * (double)last.time_us);
+    }
+    if (vented) {
+        printf("vented    in %.2f s\n", 1e-6 * (double)(report.time_us - vent_us));
+    } else {
+        (void)program_fail(EXIT_FAULT, "the chambers did not vent: %.0f, %.0f, %.0f Pa left",
+                           (double)report.pressure_pa[0], (double)report.pressure_pa[1],
+                           (double)report.pressure_pa[2]);
+        code = EXIT_FAULT;
+    }
+    return code;
+}
+
+int run_command(const struct bus_options *options, const struct controller_command *command) {
+    static struct bus bus;
+    struct run_log_writer log;
+    char error[PROGRAM_ERROR_BYTES], note[64];
+    int code = bus_open(&bus, options);
+    if (code != EXIT_OK) {
+        return code;
+    }
+    const struct bend_table_module *module = &bus.file.table.module;
+    (void)snprintf(note, sizeof note, "bus %s, seed %" PRIu64, options->bus, options->seed);
+    const struct run_log_metadata metadata = {.module = module->name,
+                                              .table_hash = module->inputs_hash,
+                                              .rate_hz = 1e6 / (double)CONTROLLER_STEP_US,
+                                              .note = note};
+    if (options->record != NULL && !run_log_create(&log, options->record, &metadata, error, sizeof error)) {
+        bus_close(&bus);
+        return program_fail(EXIT_OUTPUT, "%s", error);
+    }
+    printf("module    %s, table %s\n", module->name, bus.table_path);
+    program_catch_interrupt();
+    struct run run = {.options = options, .bus = &bus, .log = options->record != NULL ? &log : NULL};
+    code = run_on_bus(&run, command);
+    if (options->record != NULL && !run_log_finish(&log, error, sizeof error)) {
+        code = program_fail(EXIT_OUTPUT, "%s", error);
+    } else if (options->record != NULL) {
+        printf("wrote     %s\n", options->record);
+    }
+    bus_close(&bus);
+    return code;
+}
