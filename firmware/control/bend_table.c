@@ -3,6 +3,7 @@
 #include <string.h>
 
 #include "control/bend_table_format.h"
+#include "control/crc32.h"
 
 #define AXIS_NODES_LEAST 4u
 #define STENCIL 4u
@@ -10,20 +11,6 @@
 _Static_assert(__BYTE_ORDER__ == __ORDER_LITTLE_ENDIAN__, "the image is read in place, in little-endian byte order");
 
 /* --- opening --- */
-
-uint32_t bend_table_crc32(uint32_t crc, const void *bytes, size_t size) {
-    static const uint32_t half_byte[16] = {0x00000000u, 0x1db71064u, 0x3b6e20c8u, 0x26d930acu, 0x76dc4190u, 0x6b6b51f4u,
-                                           0x4db26158u, 0x5005713cu, 0xedb88320u, 0xf00f9344u, 0xd6d6a3e8u, 0xcb61b38cu,
-                                           0x9b64c2b0u, 0x86d3d2d4u, 0xa00ae278u, 0xbdbdf21cu};
-    const uint8_t *byte = bytes;
-    crc = ~crc;
-    for (size_t i = 0; i < size; i++) {
-        crc ^= byte[i];
-        crc = (crc >> 4) ^ half_byte[crc & 15u];
-        crc = (crc >> 4) ^ half_byte[crc & 15u];
-    }
-    return ~crc;
-}
 
 static uint32_t read_u32(const uint8_t *image, size_t offset) {
     uint32_t value = 0;
@@ -59,7 +46,7 @@ static enum bend_table_status check_frame(const uint8_t *image, size_t size) {
         return BEND_TABLE_BAD_SIZE;
     }
     const size_t covered = BEND_TABLE_OFFSET_CRC + 4u;
-    if (bend_table_crc32(0u, image + covered, size - covered) != read_u32(image, BEND_TABLE_OFFSET_CRC)) {
+    if (crc32_update(0u, image + covered, size - covered) != read_u32(image, BEND_TABLE_OFFSET_CRC)) {
         return BEND_TABLE_BAD_CRC;
     }
     return BEND_TABLE_OK;

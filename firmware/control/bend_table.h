@@ -94,8 +94,6 @@ enum bend_table_status bend_table_open(struct bend_table *table, const void *ima
                                        const char *module_name);
 /* A sentence for people, never NULL. */
 const char *bend_table_status_text(enum bend_table_status status);
-/* CRC-32 (IEEE 802.3, reflected, as zlib's) of `size` bytes, continuing from `crc` (0 to start). */
-uint32_t bend_table_crc32(uint32_t crc, const void *bytes, size_t size);
 
 /* Where `pressure_pa` lies; a pressure outside its axis is clamped to it, NaN to the axis' start. */
 void bend_table_locate(const struct bend_table *table, const float pressure_pa[3], struct bend_table_stencil *stencil);

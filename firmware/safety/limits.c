@@ -1,6 +1,7 @@
 #include "safety/limits.h"
 
 #include "control/bend_table_format.h"
+#include "control/crc32.h"
 #include "control/real_math.h"
 #include "safety/supervisor.h"
 
@@ -41,7 +42,7 @@ bool limits_check_table(struct limits *limits, const struct limits_parameters *p
                         const struct bend_table *table) {
     const uint32_t left = table->image_bytes - limits->table_next;
     const uint32_t count = left < parameters->table_bytes_per_step ? left : parameters->table_bytes_per_step;
-    limits->table_crc = bend_table_crc32(limits->table_crc, table->image + limits->table_next, count);
+    limits->table_crc = crc32_update(limits->table_crc, table->image + limits->table_next, count);
     limits->table_next += count;
     if (limits->table_next >= table->image_bytes) {
         limits->table_corrupt = limits->table_corrupt || limits->table_crc != table->image_crc;

@@ -8,9 +8,11 @@
 
 void body_shape_at(const struct bend_table *table, const double pressure_pa[3], struct body_shape *shape) {
     const double length_m = (double)table->module.active_length_m;
-    shape->bend_x_rad = length_m * table_extrapolated(table, pressure_pa, BEND_TABLE_CURVATURE_X, NULL);
-    shape->bend_y_rad = length_m * table_extrapolated(table, pressure_pa, BEND_TABLE_CURVATURE_Y, NULL);
-    shape->stretch = table_extrapolated(table, pressure_pa, BEND_TABLE_STRETCH, NULL);
+    struct table_point point;
+    table_point_at(&point, table, pressure_pa);
+    shape->bend_x_rad = length_m * table_point_value(&point, BEND_TABLE_CURVATURE_X, NULL);
+    shape->bend_y_rad = length_m * table_point_value(&point, BEND_TABLE_CURVATURE_Y, NULL);
+    shape->stretch = table_point_value(&point, BEND_TABLE_STRETCH, NULL);
 }
 
 void body_tip_pose(const struct bend_table_module *module, const struct body_shape *shape, struct tip_pose *pose) {

@@ -3,18 +3,22 @@
 #include <math.h>
 #include <string.h>
 
-double table_extrapolated(const struct bend_table *table, const double pressure_pa[3], enum bend_table_channel channel,
-                          double gradient[3]) {
-    float inside[3], slope[3];
-    struct bend_table_stencil stencil;
+void table_point_at(struct table_point *point, const struct bend_table *table, const double pressure_pa[3]) {
+    float inside[3];
+    point->table = table;
     for (size_t a = 0; a < 3; a++) {
         const double end = (double)table->axis_pa[a][table->nodes[a] - 1];
         inside[a] = (float)fmin(fmax(pressure_pa[a], 0.0), end);
+        point->beyond_pa[a] = pressure_pa[a] - (double)inside[a];
     }
-    bend_table_locate(table, inside, &stencil);
-    double value = (double)bend_table_gradient(table, &stencil, channel, slope);
+    bend_table_locate(table, inside, &point->stencil);
+}
+
+double table_point_value(const struct table_point *point, enum bend_table_channel channel, double gradient[3]) {
+    float slope[3];
+    double value = (double)bend_table_gradient(point->table, &point->stencil, channel, slope);
     for (size_t a = 0; a < 3; a++) {
-        value += (double)slope[a] * (pressure_pa[a] - (double)inside[a]);
+        value += (double)slope[a] * point->beyond_pa[a];
         if (gradient != NULL) {
             gradient[a] = (double)slope[a];
         }
@@ -38,10 +42,12 @@ double gas_mass_flow(const struct gas_parameters *parameters, double conductance
 static void look_up(struct chambers *chambers, const struct gas_parameters *parameters,
                     const struct bend_table *table) {
     const double length_m = (double)table->module.chamber_length_m;
+    struct table_point point;
+    table_point_at(&point, table, chambers->pressure_pa);
     for (size_t c = 0; c < 3; c++) {
         double gradient[3];
         const enum bend_table_channel channel = (enum bend_table_channel)((size_t)BEND_TABLE_VOLUME_1 + c);
-        const double volume_m2 = table_extrapolated(table, chambers->pressure_pa, channel, gradient);
+        const double volume_m2 = table_point_value(&point, channel, gradient);
         const double pressure_pa_abs = parameters->ambient_pa_abs + chambers->pressure_pa[c];
         chambers->volume_m3[c] = parameters->tube_volume_m3 + length_m * volume_m2;
         for (size_t d = 0; d < 3; d++) {

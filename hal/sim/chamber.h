@@ -39,8 +39,14 @@ void chambers_init(struct chambers *chambers, const struct gas_parameters *param
 void chambers_step(struct chambers *chambers, const struct gas_parameters *parameters, const struct bend_table *table,
                    const struct valve valve[3], const struct chamber_influence *influence, bool supply_open,
                    int64_t from_us, int64_t to_us);
-/* A channel at any pressures: inside the axes the table, outside its tangent there. `gradient` may be NULL. */
-double table_extrapolated(const struct bend_table *table, const double pressure_pa[3], enum bend_table_channel channel,
-                          double gradient[3]);
+/* The table at any pressures: inside its axes as it is, outside its tangent at the edge. */
+struct table_point {
+    const struct bend_table *table;
+    struct bend_table_stencil stencil;
+    double beyond_pa[3];
+};
+void table_point_at(struct table_point *point, const struct bend_table *table, const double pressure_pa[3]);
+/* `gradient` may be NULL; channel unit per Pa. */
+double table_point_value(const struct table_point *point, enum bend_table_channel channel, double gradient[3]);
 
 #endif
