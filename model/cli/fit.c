@@ -180,9 +180,8 @@ int cli_fit(int argc, char **argv) {
         code = program_fail(EXIT_BAD_INPUT, "%s: %s", arguments.path, message);
     } else {
         print_fit(&fit);
-        if (arguments.output != NULL && !write_yaml(&arguments, &fit, message, sizeof message)) {
-            code = program_fail(EXIT_OUTPUT, "%s", message);
-        } else if (arguments.plot != NULL && !draw(&arguments, &test, &fit, message, sizeof message)) {
+        if ((arguments.output != NULL && !write_yaml(&arguments, &fit, message, sizeof message)) ||
+            (arguments.plot != NULL && !draw(&arguments, &test, &fit, message, sizeof message))) {
             code = program_fail(EXIT_OUTPUT, "%s", message);
         }
     }

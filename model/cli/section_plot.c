@@ -2,6 +2,7 @@
 
 #include <math.h>
 #include <stdlib.h>
+#include <string.h>
 
 #include "program/gnuplot.h"
 #include "section/section_mesh.h"
@@ -46,7 +47,8 @@ static double extent_mm(const struct section_mesh *mesh, const double *position_
 bool section_plot(const char *png_path, const struct module_description *module, const struct section_mesh *mesh,
                   struct section_solver *solver, char *error, size_t error_bytes) {
     struct section_state state;
-    struct gnuplot plot;
+    struct gnuplot plot = {.script = NULL};
+    memset(&state, 0, sizeof state);
     double *position_m = calloc(2 * mesh->node_count, sizeof(double));
     double *stretch = calloc(mesh->triangle_count, sizeof(double));
     bool drawn = position_m != NULL && stretch != NULL;

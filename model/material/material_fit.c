@@ -120,7 +120,8 @@ double material_nominal_stress_pa(const struct material *material, enum deformat
 
 double material_stable_stretch(const struct material *material, enum deformation_mode mode, double stretch_max) {
     double last = 0.0;
-    for (double stretch = 1.0 + STABILITY_STEP; stretch < stretch_max; stretch += STABILITY_STEP) {
+    for (int step = 1; 1.0 + step * STABILITY_STEP < stretch_max; step++) {
+        const double stretch = 1.0 + step * STABILITY_STEP;
         const double stress = material_nominal_stress_pa(material, mode, stretch);
         if (stress <= last) {
             return stretch - STABILITY_STEP;

@@ -156,7 +156,7 @@ static void sketch_disc(struct sketch *sketch, double outer_m, const struct cavi
 /* --- from gmsh to our arrays --- */
 
 static struct section_mesh *new_mesh(size_t nodes, size_t triangles) {
-    struct section_mesh *mesh = calloc(1, sizeof *mesh);
+    struct section_mesh *mesh = nodes == 0 || triangles == 0 ? NULL : calloc(1, sizeof *mesh);
     if (mesh == NULL) {
         return NULL;
     }
@@ -278,12 +278,16 @@ static void add_copy(struct section_mesh *whole, const struct section_mesh *wedg
 
 static struct section_mesh *unfold_wedge(const struct section_mesh *wedge, double outer_m) {
     struct section_mesh *whole = new_mesh(6 * wedge->node_count, 6 * wedge->triangle_count);
-    size_t *image = malloc(wedge->node_count * sizeof *image);
-    if (whole != NULL && image != NULL) {
+    size_t *image = malloc((wedge->node_count + 1) * sizeof *image);
+    if (image == NULL) {
+        section_mesh_free(whole);
+        whole = NULL;
+    }
+    if (whole != NULL) {
         whole->triangle_count = 0;
-        for (int copy = 0; copy < 6; copy++) {
-            add_copy(whole, wedge, (copy / 2) * 2.0 * PI / 3.0, copy % 2 == 0 ? 1.0 : -1.0, image,
-                     MERGE_TOLERANCE * outer_m);
+        for (int third = 0; third < 3; third++) {
+            add_copy(whole, wedge, third * 2.0 * PI / 3.0, 1.0, image, MERGE_TOLERANCE * outer_m);
+            add_copy(whole, wedge, third * 2.0 * PI / 3.0, -1.0, image, MERGE_TOLERANCE * outer_m);
         }
     }
     free(image);

@@ -157,7 +157,7 @@ static void sort_chambers(const size_t index[3], size_t order[3]) {
     for (size_t c = 0; c < 3; c++) {
         size_t rank = 0;
         for (size_t d = 0; d < 3; d++) {
-            rank += index[d] > index[c] || (index[d] == index[c] && d < c);
+            rank += index[d] > index[c] || (d < c && index[d] == index[c]);
         }
         order[rank] = c;
     }
