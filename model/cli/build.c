@@ -113,7 +113,7 @@ static int run(struct arguments *arguments) {
     arguments->build.context = &terminal;
     const double start_s = seconds();
     if (!table_build(&module, &arguments->build, &image, &error)) {
-        return program_fail(EXIT_SOLVER, "%s%s", terminal ? "\n" : "", error.text);
+        return program_fail(program_interrupted != 0 ? EXIT_INTERRUPTED : EXIT_SOLVER, "%s%s", terminal ? "\n" : "", error.text);
     }
     const bool written = table_image_write(&image, output, message, sizeof message);
     if (written) {

@@ -291,7 +291,7 @@ int cli_published(int argc, char **argv) {
     print_trends(&positive);
     print_ecoflex_0050(&positive);
     if (program_interrupted != 0) {
-        return program_fail(EXIT_SOLVER, "interrupted");
+        return program_fail(EXIT_INTERRUPTED, "interrupted");
     }
     print_silent();
     return EXIT_OK;

@@ -186,7 +186,7 @@ static int solve(const struct arguments *arguments, const struct module_descript
     }
     program_catch_interrupt();
     if (!section_solver_path(solver, direction_pa, goal, value, take_point, &report, &error)) {
-        return program_fail(EXIT_SOLVER, "%s: %s", module->name,
+        return program_fail(program_interrupted != 0 ? EXIT_INTERRUPTED : EXIT_SOLVER, "%s: %s", module->name,
                         program_interrupted != 0 ? "interrupted; nothing was written" : error.text);
     }
     if (arguments->quiet || (report.points - 1) % ROWS_SHOWN_EVERY != 0) {

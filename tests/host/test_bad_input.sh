@@ -1,0 +1,162 @@
+#!/bin/bash
+# Bad input to both programs: each has its own message and exit code, and leaves nothing half-written.
+build=${TRIBEND_BUILD:-build}
+tribend=$build/tribend tables=$build/tribend-tables
+scratch=$(mktemp -d)
+trap 'rm -rf "$scratch"' EXIT
+mkdir -p "$scratch/modules" "$scratch/materials" "$scratch/out"
+cp tables/materials/*.yaml "$scratch/materials/"
+passed=0 failed=0
+
+# expect NAME EXIT_CODE WORDS_IN_MESSAGE command...: also checks that $scratch/out stays empty.
+expect() {
+    local name=$1 code=$2 words=$3 status
+    shift 3
+    echo "[ RUN      ] $name"
+    "$@" >"$scratch/stdout" 2>"$scratch/stderr"
+    status=$?
+    if [ "$status" -eq "$code" ] && grep -qiE -- "$words" "$scratch/stderr" && [ -z "$(ls -A "$scratch/out")" ]; then
+        echo "[       OK ] $name"
+        passed=$((passed + 1))
+    else
+        echo "exit $status, expected $code; wanted /$words/ in:"
+        cat "$scratch/stderr"
+        ls -A "$scratch/out"
+        echo "[  FAILED  ] $name"
+        failed=$((failed + 1))
+        rm -rf "$scratch/out/"*
+    fi
+}
+# module NAME SED_SCRIPT: a module like the reference one, changed
+module() {
+    sed -E "$2" tables/modules/paper-semicircle.yaml >"$scratch/modules/$1.yaml"
+    cmp -s tables/modules/paper-semicircle.yaml "$scratch/modules/$1.yaml" && echo "the change to $1 changed nothing"
+    echo "$scratch/modules/$1.yaml"
+}
+build_table() { "$tables" build "$1" -o "$scratch/out/table.tbt"; }
+
+# --- module and material files
+expect module_key_missing 3 'radius_m' build_table "$(module missing '/radius_m/d')"
+expect module_key_unknown 3 'colour' build_table "$(module unknown 's/^outer_diameter_m.*/&\ncolour: red/')"
+expect module_limit_missing 3 'burst_pressure_pa' build_table "$(module limit '/burst/d')"
+expect radius_negative 3 'radius_m.*-0.0037' build_table "$(module negative 's/radius_m: 0/radius_m: -0/')"
+expect chambers_overlap 3 'overlap' build_table "$(module overlap 's/radius_m: .*/radius_m: 0.0070/; s/0\.0073/0.0053/; s/semicircle/circle/')"
+expect chamber_leaves_module 3 'leaves|outside' build_table "$(module leaves 's/0\.0073/0.0103/')"
+expect shape_unknown 3 'shape|triangle' build_table "$(module shape 's/shape: semicircle/shape: triangle/')"
+expect number_malformed 3 'length_m' build_table "$(module number 's/^length_m: .*/length_m: long/')"
+expect caps_longer_than_module 3 'cap|length' build_table "$(module caps 's/proximal_m: .*/proximal_m: 0.070/')"
+expect burst_below_working 3 'burst' build_table "$(module burst 's/burst_pressure_pa: .*/burst_pressure_pa: 1000/')"
+expect material_unknown 3 'unobtainium' build_table "$(module material 's/^material: .*/material: unobtainium/')"
+expect yaml_broken 3 'broken.yaml' build_table "$(module broken 's/^chambers:/chambers: [/')"
+expect module_file_missing 3 'no-such-module' build_table no-such-module
+sed 's/^law: .*/law: hooke/' tables/materials/ecoflex-0030-positive.yaml >"$scratch/materials/bad-law.yaml"
+expect law_unknown 3 'law|hooke' "$tables" solve paper-semicircle --material "$scratch/materials/bad-law.yaml" --to 5deg
+sed '/^bulk/d' tables/materials/ecoflex-0030-positive.yaml >"$scratch/materials/no-bulk.yaml"
+expect material_key_missing 3 'bulk_modulus_pa' "$tables" solve paper-semicircle --material "$scratch/materials/no-bulk.yaml" --to 5deg
+expect output_folder_missing 5 '/nowhere' "$tables" solve paper-semicircle --to 2deg --csv /nowhere/path.csv
+
+# --- tables
+reference=tables/paper-semicircle.tbt
+head -c 100000 "$reference" >"$scratch/truncated.tbt"
+head -c 10 "$reference" >"$scratch/short.tbt"
+: >"$scratch/empty.tbt"
+cp "$reference" "$scratch/flipped.tbt"
+byte=$(od -An -tu1 -j 60000 -N 1 "$scratch/flipped.tbt")
+printf "\\x$(printf %x $((byte ^ 16)))" | dd of="$scratch/flipped.tbt" bs=1 seek=60000 conv=notrunc status=none
+for file in truncated short empty; do
+    expect "table_$file" 3 "$file.tbt.*(short|cut|size|bytes)" "$tribend" bend 60deg --table "$scratch/$file.tbt" --record "$scratch/out/run.csv"
+done
+expect table_bit_flipped 3 'flipped.tbt.*CRC' "$tribend" bend 60deg --table "$scratch/flipped.tbt" --record "$scratch/out/run.csv"
+expect table_bit_flipped_show 3 'CRC' "$tables" show "$scratch/flipped.tbt"
+expect table_of_another_module 3 'paper-semicircle.*paper-circle' "$tribend" bend 60deg --module paper-circle --table "$reference" --record "$scratch/out/run.csv"
+expect table_missing 3 'nothing.tbt' "$tribend" status --table "$scratch/nothing.tbt"
+expect table_is_no_table 3 'not a bend table' "$tribend" status --table README.md
+expect table_is_a_folder 3 'tables' "$tribend" status --table tables
+
+# --- run logs
+"$tribend" bend 20deg --for 1s -q --record "$scratch/run.csv" >/dev/null || failed=$((failed + 1))
+awk -F, -v OFS=, '/^#/ { print; next } /^time_s/ { for (i = 1; i <= NF; i++) if ($i == "p1_pa") drop = i }
+    { line = ""; for (i = 1; i <= NF; i++) if (i != drop) line = line (line == "" ? "" : OFS) $i; print line }' \
+    "$scratch/run.csv" >"$scratch/no-p1.csv"
+expect log_column_missing 3 'p1_pa' "$tribend" plot "$scratch/no-p1.csv" -o "$scratch/out/run.png"
+head -c 5000 "$scratch/run.csv" >"$scratch/cut.csv"
+expect log_cut_off 3 'cut.csv:[0-9]+' "$tribend" plot "$scratch/cut.csv" -o "$scratch/out/run.png"
+expect log_missing 3 'none.csv' "$tribend" plot "$scratch/none.csv" -o "$scratch/out/run.png"
+expect log_is_a_table 3 'no run log' "$tribend" plot "$reference" -o "$scratch/out/run.png"
+expect picture_folder_missing 5 '/nowhere' "$tribend" plot "$scratch/run.csv" -o /nowhere/run.png
+expect record_folder_missing 5 '/nowhere' "$tribend" bend 20deg --record /nowhere/run.csv
+
+# --- the command line
+expect bend_without_unit 2 "'60' has no unit.*60deg" "$tribend" bend 60
+expect toward_without_unit 2 "'30' has no unit" "$tribend" bend 60deg --toward 30
+expect bend_with_pressure_unit 2 'mbar' "$tribend" bend 60mbar
+expect bend_negative 2 'negative' "$tribend" bend -- -60deg
+expect bend_missing 2 '60deg' "$tribend" bend
+expect two_bends 2 'too much' "$tribend" bend 60deg 30deg
+expect pressure_missing 2 'three pressures' "$tribend" pressure 40mbar 0mbar
+expect pressure_negative 2 'below ambient' "$tribend" pressure -- -40mbar 0mbar 0mbar
+expect pressure_without_unit 2 "'0' has no unit" "$tribend" pressure 40mbar 0 0mbar
+expect duration_zero 2 'between 0 and' "$tribend" bend 60deg --for 0s
+expect bus_unknown 2 "no bus 'can9'" "$tribend" status --bus can9
+expect effect_unknown 2 'creep' "$tribend" bend 60deg --effect crep
+expect effect_out_of_bounds 2 'amplitude' "$tribend" bend 60deg --effect creep:amplitude=9
+expect drill_unknown 2 'overpressure' "$tribend" bend 60deg --drill fire@1s
+expect drill_without_time 2 'tip-lost@2s' "$tribend" bend 60deg --drill tip-lost
+expect seed_negative 2 'whole number' "$tribend" bend 60deg --seed -1
+expect option_unknown 2 'speed' "$tribend" bend 60deg --speed 3
+expect subcommand_unknown 2 "'dance'" "$tribend" dance
+expect subcommand_missing 2 'Usage' "$tribend"
+expect tables_subcommand_unknown 2 "'dance'" "$tables" dance
+expect goal_without_unit 2 "'90' has no unit" "$tables" solve paper-semicircle --to 90
+expect chamber_unknown 2 'chambers' "$tables" solve paper-semicircle --chamber 4
+expect law_option_unknown 2 'law' "$tables" fit "$scratch/run.csv" --law hooke
+expect tensile_file_wrong 3 'run.csv' "$tables" fit "$scratch/run.csv" --law yeoh
+
+# --- faults end a run with their own code, and keep its log
+for fault in overpressure sensor-range command-timeout table-corrupt; do
+    name="drill_${fault//-/_}"
+    expect "$name" 6 'FAULT.*(overpressure|out of range|timeout|corrupt)' "$tribend" bend 40deg --for 4s -q --drill "$fault@1s"
+done
+"$tribend" bend 40deg --for 4s -q --drill overpressure@1s --record "$scratch/fault.csv" >/dev/null 2>&1
+echo "[ RUN      ] a_fault_keeps_the_log"
+if grep -q ',FAULT,' "$scratch/fault.csv"; then
+    echo "[       OK ] a_fault_keeps_the_log"
+    passed=$((passed + 1))
+else
+    echo "[  FAILED  ] a_fault_keeps_the_log"
+    failed=$((failed + 1))
+fi
+
+# --- Ctrl-C: vents, keeps the log, 130
+echo "[ RUN      ] interrupted_run"
+"$tribend" bend 40deg --for 1440min --record "$scratch/interrupted.csv" >"$scratch/stdout" 2>&1 &
+pid=$!
+sleep 0.7
+kill -INT $pid
+wait $pid
+status=$?
+if [ "$status" -eq 130 ] && grep -q '^vented' "$scratch/stdout" && "$tribend" plot "$scratch/interrupted.csv" -o "$scratch/interrupted.png" >/dev/null; then
+    echo "[       OK ] interrupted_run"
+    passed=$((passed + 1))
+else
+    tail -3 "$scratch/stdout"
+    echo "[  FAILED  ] interrupted_run"
+    failed=$((failed + 1))
+fi
+echo "[ RUN      ] interrupted_build"
+"$tables" build paper-semicircle -o "$scratch/out/table.tbt" >"$scratch/stdout" 2>&1 &
+pid=$!
+sleep 1
+kill -INT $pid
+wait $pid
+status=$?
+if [ "$status" -eq 130 ] && [ -z "$(ls -A "$scratch/out")" ]; then
+    echo "[       OK ] interrupted_build"
+    passed=$((passed + 1))
+else
+    echo "exit $status"; tail -3 "$scratch/stdout"; ls -A "$scratch/out"
+    echo "[  FAILED  ] interrupted_build"
+    failed=$((failed + 1))
+fi
+echo "[  PASSED  ] $passed test(s)."
+[ "$failed" -eq 0 ] && [ "$passed" -ge 60 ]
