@@ -23,8 +23,7 @@ ALL_H      := $(wildcard firmware/*.h firmware/*/*.h hal/*.h hal/*/*.h model/*/*
 # --- flags
 WARNINGS := -Wall -Wextra -Wpedantic -Wconversion -Wsign-conversion -Wshadow -Werror
 OPTIMISE := -O2 -g -fno-math-errno
-SANITIZE_FLAGS := $(if $(filter 1,$(SANITIZE)),-fsanitize=address$(comma)undefined -fno-sanitize-recover=all -fno-omit-frame-pointer)
-comma := ,
+SANITIZE_FLAGS := $(if $(filter 1,$(SANITIZE)),-fsanitize=address -fsanitize=undefined -fno-sanitize-recover=all -fno-omit-frame-pointer)
 # No fused multiply-add and no reassociation anywhere: the same inputs give the same bits on every build.
 EXACT := -ffp-contract=off
 INCLUDES := -Ifirmware -Ihal -Imodel -Ihost -Itests
