@@ -127,7 +127,7 @@ enum run_plot_result run_plot(const struct run_log *log, const char *log_path, c
     const int time = run_log_column(log, "time_s");
     fprintf(plot.script,
             "set multiplot layout 4,1 title 'Run of %s'\nset grid\nset key outside right top\nset lmargin 9\n"
-            "set rmargin 18\nset xrange [%.6f:%.6f]\n",
+            "set rmargin 20\nset xrange [%.6f:%.6f]\n",
             log->module[0] == '\0' || strchr(log->module, '\'') != NULL ? "an unnamed module" : log->module,
             cell(log, 0, time), fmax(cell(log, log->rows - 1, time), cell(log, 0, time) + 1e-3));
     draw_chambers(plot.script, log);

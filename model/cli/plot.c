@@ -9,6 +9,7 @@
 
 #define DEGREES (180.0 / M_PI)
 #define CURVE_POINTS 200
+#define LABEL_DISTANCE 1.3 /* of the farthest bend */
 #define GRID_POINTS 24
 
 struct arguments {
@@ -81,7 +82,8 @@ static void draw_curves(FILE *script, const struct bend_table *table) {
 static void draw_plane(FILE *script, const struct bend_table *table) {
     const double limit_pa = (double)table->module.working_pressure_pa;
     fputs("set title 'Reach: one chamber vented, the others up to the working pressure'\nset size ratio -1\n"
-          "set xlabel 'bend towards x / deg'\nset ylabel 'bend towards y / deg'\nset key off\nset offsets graph 0.08, graph 0.08, graph 0.05, graph 0.05\n"
+          "set xlabel 'bend towards x / deg'\nset ylabel 'bend towards y / deg'\nset key off\n"
+          "set offsets graph 0.08, graph 0.08, graph 0.05, graph 0.05\n"
           "plot for [i=0:2] '-' w l lw 1 lc i+1, for [i=1:3] '-' w labels\n",
           script);
     for (size_t vented = 0; vented < 3; vented++) {
@@ -101,9 +103,10 @@ static void draw_plane(FILE *script, const struct bend_table *table) {
     }
     for (size_t c = 0; c < 3; c++) {
         double p[3] = {0.0, 0.0, 0.0}, bend_deg[2];
-        p[c] = 1.08 * limit_pa;
+        p[c] = limit_pa;
         bend_at(table, p[0], p[1], p[2], bend_deg);
-        fprintf(script, "%.4f %.4f \"chamber %zu\"\ne\n", bend_deg[0], bend_deg[1], c + 1);
+        fprintf(script, "%.4f %.4f \"chamber %zu\"\ne\n", LABEL_DISTANCE * bend_deg[0], LABEL_DISTANCE * bend_deg[1],
+                c + 1);
     }
 }
 
