@@ -8,7 +8,6 @@
 
 #include "cli/cli.h"
 #include "table/table_builder.h"
-#include "units/units.h"
 
 #define BAR_WIDTH 40
 
@@ -30,7 +29,7 @@ static const struct argp_option options[] = {
 
 static error_t parse(int key, char *argument, struct argp_state *state) {
     struct arguments *arguments = state->input;
-    char error[PROGRAM_ERROR_BYTES], *end = NULL;
+    char *end = NULL;
     switch (key) {
     case 'o':
         arguments->output = argument;
@@ -45,11 +44,7 @@ static error_t parse(int key, char *argument, struct argp_state *state) {
         }
         return 0;
     case 's':
-        if (!units_parse(UNITS_LENGTH, argument, &arguments->build.size_m, error, sizeof error)) {
-            argp_error(state, "--mesh-size: %s", error);
-        } else if (!(arguments->build.size_m >= 1e-4)) {
-            argp_error(state, "--mesh-size: %s is under 0.1mm", argument);
-        }
+        cli_mesh_size(state, argument, &arguments->build.size_m);
         return 0;
     case 'q':
         arguments->quiet = true;

@@ -2,6 +2,8 @@
 #ifndef TRIBEND_TABLES_CLI_H
 #define TRIBEND_TABLES_CLI_H
 
+#include <argp.h>
+
 #include "description/module_description.h"
 #include "program/program.h"
 
@@ -15,6 +17,8 @@ int cli_published(int argc, char **argv);
 
 /* The file of a module: `name` itself where it is a path, else tables/modules/NAME.yaml. */
 void cli_module_path(const char *name, char path[PROGRAM_PATH_BYTES]);
+/* An element size from the command line, or argp's complaint. */
+void cli_mesh_size(struct argp_state *state, const char *argument, double *size_m);
 void cli_print_material(const struct material *material);
 
 #endif

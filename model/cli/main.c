@@ -3,6 +3,9 @@
 #include <string.h>
 
 #include "cli/cli.h"
+#include "units/units.h"
+
+#define MESH_SIZE_LEAST_M 1e-4
 
 static const struct program_subcommand subcommands[] = {
     {"solve", cli_solve, "follow a module's equilibria under pressure, up to a pressure or a bend"},
@@ -20,6 +23,15 @@ void cli_module_path(const char *name, char path[PROGRAM_PATH_BYTES]) {
         char relative[PROGRAM_PATH_BYTES];
         (void)snprintf(relative, sizeof relative, "tables/modules/%s.yaml", name);
         program_find(relative, path);
+    }
+}
+
+void cli_mesh_size(struct argp_state *state, const char *argument, double *size_m) {
+    char error[PROGRAM_ERROR_BYTES];
+    if (!units_parse(UNITS_LENGTH, argument, size_m, error, sizeof error)) {
+        argp_error(state, "--mesh-size: %s", error);
+    } else if (!(*size_m >= MESH_SIZE_LEAST_M)) {
+        argp_error(state, "--mesh-size: %s is under 0.1mm", argument);
     }
 }
 

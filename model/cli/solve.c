@@ -51,7 +51,6 @@ static error_t parse_chambers(struct argp_state *state, const char *list, bool c
 
 static error_t parse(int key, char *argument, struct argp_state *state) {
     struct arguments *arguments = state->input;
-    char error[PROGRAM_ERROR_BYTES];
     switch (key) {
     case 'm':
         arguments->material = argument;
@@ -71,11 +70,7 @@ static error_t parse(int key, char *argument, struct argp_state *state) {
         arguments->quiet = true;
         return 0;
     case 's':
-        if (!units_parse(UNITS_LENGTH, argument, &arguments->mesh_size_m, error, sizeof error)) {
-            argp_error(state, "--mesh-size: %s", error);
-        } else if (!(arguments->mesh_size_m >= 1e-4)) {
-            argp_error(state, "--mesh-size: %s is under 0.1mm", argument);
-        }
+        cli_mesh_size(state, argument, &arguments->mesh_size_m);
         return 0;
     case ARGP_KEY_ARG:
         if (state->arg_num > 0) {

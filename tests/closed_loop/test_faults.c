@@ -7,19 +7,6 @@
 #define VENT_WITHIN_MS 2
 #define MISSIONS 60
 
-static struct table_file file;
-
-static int open_reference(void **state) {
-    (void)state;
-    return table_file_open(&file, RIG_TABLE, NULL);
-}
-
-static int close_reference(void **state) {
-    (void)state;
-    table_file_close(&file);
-    return 0;
-}
-
 /* A run under way: bend or pressures, at an arbitrary phase of the PWM period. */
 static void start_mission(struct rig *rig, uint64_t mission, const struct bend_table *table) {
     const struct controller_command bend = rig_bend(10.0 + (double)(mission * 13 % 90), (double)(mission * 37 % 360));
@@ -60,7 +47,7 @@ static void overpressure(void **state) {
     (void)state;
     static struct rig rig;
     for (uint64_t mission = 0; mission < MISSIONS; mission++) {
-        start_mission(&rig, mission, &file.table);
+        start_mission(&rig, mission, &rig_file.table);
         rig.sim.sim.faults.reading_replaced[mission % 3] = true;
         rig.sim.sim.faults.reading_pa[mission % 3] = 13100.0f;
         assert_int_equal(expect_fault(&rig, FAULT_OVERPRESSURE, 1), 1);
@@ -72,7 +59,7 @@ static void sensor_out_of_range(void **state) {
     static struct rig rig;
     for (uint64_t mission = 0; mission < MISSIONS; mission++) {
         struct sim_faults *faults = &rig.sim.sim.faults;
-        start_mission(&rig, mission, &file.table);
+        start_mission(&rig, mission, &rig_file.table);
         switch (mission % 5) {
         case 0:
             faults->pressure_bus_fails = true;
@@ -93,7 +80,7 @@ static void command_timeout(void **state) {
     (void)state;
     static struct rig rig;
     for (uint64_t mission = 0; mission < MISSIONS; mission++) {
-        start_mission(&rig, mission, &file.table);
+        start_mission(&rig, mission, &rig_file.table);
         rig.silent = true;
         const int64_t last_us = rig.sim.app.controller.command_us;
         (void)expect_fault(&rig, FAULT_COMMAND_TIMEOUT, 501);
@@ -106,7 +93,7 @@ static void hold_times_out_too(void **state) {
     (void)state;
     static struct rig rig;
     const struct controller_command hold = {.kind = COMMAND_HOLD};
-    start_mission(&rig, 5, &file.table);
+    start_mission(&rig, 5, &rig_file.table);
     rig_command(&rig, &hold);
     rig_run(&rig, 100);
     assert_int_equal(rig.report.status.state, SUPERVISOR_HOLD);
@@ -118,18 +105,18 @@ static void hold_times_out_too(void **state) {
 static void table_corrupt(void **state) {
     (void)state;
     static struct rig rig;
-    const int round_ms = (int)(file.table.image_bytes / 256u) + 2;
+    const int round_ms = (int)(rig_file.table.image_bytes / 256u) + 2;
     int slowest_ms = 0;
     for (uint64_t mission = 0; mission < MISSIONS; mission++) {
-        const size_t byte = 16 + mission * 2971 % (file.size - 16);
+        const size_t byte = 16 + mission * 2971 % (rig_file.size - 16);
         /* the plant must not see the damage: it has its own copy */
         struct table_file plant;
         assert_int_equal(table_file_open(&plant, RIG_TABLE, NULL), 0);
-        start_mission(&rig, mission, &file.table);
+        start_mission(&rig, mission, &rig_file.table);
         rig.sim.sim.table = &plant.table;
-        file.bytes[byte] ^= 0x01u; /* the last bit of a number, mostly: the command stays nearly what it was */
+        rig_file.bytes[byte] ^= 0x01u; /* the last bit of a number, mostly: the command stays nearly what it was */
         const int steps = expect_fault(&rig, FAULT_TABLE_CORRUPT, 2 * round_ms);
-        file.bytes[byte] ^= 0x01u;
+        rig_file.bytes[byte] ^= 0x01u;
         slowest_ms = steps > slowest_ms ? steps : slowest_ms;
         table_file_close(&plant);
     }
@@ -141,7 +128,7 @@ static void tip_lost(void **state) {
     (void)state;
     static struct rig rig;
     for (uint64_t mission = 1; mission < MISSIONS; mission += mission % 3 == 2 ? 2 : 1) {
-        start_mission(&rig, mission, &file.table);
+        start_mission(&rig, mission, &rig_file.table);
         rig_run(&rig, 1500);
         rig.sim.sim.faults.tip_stops = true;
         int64_t last_us = 0;
@@ -161,7 +148,7 @@ static void tip_lost(void **state) {
         const double wanted_x = (double)rig.command.bend_rad * cos((double)rig.command.direction_rad);
         const double wanted_y = (double)rig.command.bend_rad * sin((double)rig.command.direction_rad);
         struct body_shape shape;
-        body_shape_at(&file.table, rig.sim.sim.chambers.pressure_pa, &shape);
+        body_shape_at(&rig_file.table, rig.sim.sim.chambers.pressure_pa, &shape);
         assert_under(hypot(shape.bend_x_rad - wanted_x, shape.bend_y_rad - wanted_y) * 180.0 / M_PI, 1.5);
         /* and the loop closes again when samples come back */
         rig.sim.sim.faults.tip_stops = false;
@@ -176,7 +163,7 @@ static void a_fault_stays_until_cleared_and_only_without_its_cause(void **state)
     static struct rig rig;
     const struct controller_command clear = {.kind = COMMAND_CLEAR};
     const struct controller_command bend = rig_bend(40.0, 10.0);
-    start_mission(&rig, 4, &file.table);
+    start_mission(&rig, 4, &rig_file.table);
     rig.sim.sim.faults.channel_fails[1] = true;
     (void)expect_fault(&rig, FAULT_SENSOR_RANGE, 1);
     rig.command.kind = COMMAND_NONE;
@@ -199,7 +186,7 @@ static void a_fault_stays_until_cleared_and_only_without_its_cause(void **state)
 static void outputs_that_cannot_be_written_are_counted(void **state) {
     (void)state;
     static struct rig rig;
-    start_mission(&rig, 2, &file.table);
+    start_mission(&rig, 2, &rig_file.table);
     rig.sim.sim.faults.outputs_fail = true;
     rig_run(&rig, 10);
     assert_int_equal(rig.sim.app.hal_errors, 10);
@@ -216,5 +203,5 @@ int main(void) {
         cmocka_unit_test(a_fault_stays_until_cleared_and_only_without_its_cause),
         cmocka_unit_test(outputs_that_cannot_be_written_are_counted),
     };
-    return cmocka_run_group_tests(tests, open_reference, close_reference);
+    return cmocka_run_group_tests(tests, rig_open, rig_close);
 }

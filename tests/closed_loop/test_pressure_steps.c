@@ -8,19 +8,6 @@
 #define HOLD_MS 1500
 #define PERIOD_MS 10
 
-static struct table_file file;
-
-static int open_reference(void **state) {
-    (void)state;
-    return table_file_open(&file, RIG_TABLE, NULL);
-}
-
-static int close_reference(void **state) {
-    (void)state;
-    table_file_close(&file);
-    return 0;
-}
-
 /* Time that the step takes with the valve open, or venting, all the while: no delay, no period. ms */
 static double full_flow_ms(double from_pa, double to_pa) {
     struct sim_parameters parameters;
@@ -30,7 +17,7 @@ static double full_flow_ms(double from_pa, double to_pa) {
     sim_default_parameters(&parameters);
     const struct chamber_influence influence = {.conductance_scale = {1.0, 1.0, 1.0},
                                                 .supply_pa = parameters.supply_pa};
-    chambers_init(&chambers, &parameters.gas, &file.table);
+    chambers_init(&chambers, &parameters.gas, &rig_file.table);
     int64_t start_us = -1, at_us = 0;
     for (const int64_t step_us = 100; at_us < 20000000; at_us += step_us) {
         const bool filling = up || start_us < 0;
@@ -41,7 +28,7 @@ static double full_flow_ms(double from_pa, double to_pa) {
             break;
         }
         const bool fills = filling && !(start_us >= 0 && !up);
-        chambers_step(&chambers, &parameters.gas, &file.table, fills ? open : shut, &influence, true, at_us,
+        chambers_step(&chambers, &parameters.gas, &rig_file.table, fills ? open : shut, &influence, true, at_us,
                       at_us + step_us);
     }
     return 1e-3 * (double)(at_us - start_us);
@@ -54,17 +41,17 @@ static double forced_ripple_pa(double pressure_pa) {
     struct chambers chambers;
     sim_default_parameters(&parameters);
     const struct gas_parameters *gas = &parameters.gas;
-    chambers_init(&chambers, gas, &file.table);
+    chambers_init(&chambers, gas, &rig_file.table);
     const struct valve shut[3] = {{0, 0}, {0, 0}, {0, 0}}, open[3] = {{0, INT64_MAX}, {0, 0}, {0, 0}};
     const struct chamber_influence influence = {.conductance_scale = {1.0, 1.0, 1.0},
                                                 .supply_pa = parameters.supply_pa};
     double rate[2] = {0.0, 0.0};
     while (chambers.pressure_pa[0] < pressure_pa) {
-        chambers_step(&chambers, gas, &file.table, open, &influence, true, 0, 100);
+        chambers_step(&chambers, gas, &rig_file.table, open, &influence, true, 0, 100);
     }
     for (int fills = 0; fills < 2; fills++) {
         struct chambers from = chambers;
-        chambers_step(&from, gas, &file.table, fills == 1 ? open : shut, &influence, true, 0, 100);
+        chambers_step(&from, gas, &rig_file.table, fills == 1 ? open : shut, &influence, true, 0, 100);
         rate[fills] = fabs(from.pressure_pa[0] - chambers.pressure_pa[0]) / 1e-4;
     }
     return 1e-3 * PERIOD_MS * rate[0] * rate[1] / (rate[0] + rate[1]);
@@ -83,7 +70,7 @@ static struct response step_response(double from_pa, double to_pa, uint64_t seed
     struct response response = {0.0, 0.0, 0.0, 0.0, 0.0};
     const struct controller_command before = rig_pressure(from_pa, 0.0, 0.0), after = rig_pressure(to_pa, 0.0, 0.0);
     const double sign = to_pa > from_pa ? 1.0 : -1.0;
-    rig_start(&rig, &file.table, seed);
+    rig_start(&rig, &rig_file.table, seed);
     rig_command(&rig, &before);
     rig_run(&rig, 2000 + (int)(seed % 10u)); /* at any phase of the PWM period */
     rig_command(&rig, &after);
@@ -165,7 +152,7 @@ static void three_chambers_settle_together(void **state) {
     (void)state;
     static struct rig rig;
     const struct controller_command command = rig_pressure(8000.0, 5000.0, 3000.0);
-    rig_start(&rig, &file.table, 9);
+    rig_start(&rig, &rig_file.table, 9);
     rig_command(&rig, &command);
     rig_run(&rig, HOLD_MS);
     for (int i = 0; i < 1000; i++) {
@@ -180,11 +167,11 @@ static void a_pressure_over_the_working_limit_is_cut_and_flagged(void **state) {
     (void)state;
     static struct rig rig;
     const struct controller_command command = rig_pressure(14000.0, 0.0, 0.0);
-    rig_start(&rig, &file.table, 9);
+    rig_start(&rig, &rig_file.table, 9);
     rig_command(&rig, &command);
     rig_run(&rig, 3000);
     assert_true((rig.report.status.warnings & (1u << WARNING_COMMAND_LIMITED)) != 0u);
-    assert_close(rig.sim.sim.chambers.pressure_pa[0], (double)file.table.module.working_pressure_pa, 250.0);
+    assert_close(rig.sim.sim.chambers.pressure_pa[0], (double)rig_file.table.module.working_pressure_pa, 250.0);
     assert_int_equal(rig.report.status.faults, 0);
 }
 
@@ -192,7 +179,7 @@ static void the_observer_learns_a_wrong_conductance(void **state) {
     (void)state;
     static struct rig rig;
     const struct controller_command command = rig_pressure(6000.0, 0.0, 0.0);
-    rig_start(&rig, &file.table, 10);
+    rig_start(&rig, &rig_file.table, 10);
     rig.sim.sim.parameters.gas.sonic_conductance *= 0.85; /* valve and tube let less through than the firmware thinks */
     rig_command(&rig, &command);
     rig_run(&rig, 3000);
@@ -212,5 +199,5 @@ int main(void) {
         cmocka_unit_test(a_pressure_over_the_working_limit_is_cut_and_flagged),
         cmocka_unit_test(the_observer_learns_a_wrong_conductance),
     };
-    return cmocka_run_group_tests(tests, open_reference, close_reference);
+    return cmocka_run_group_tests(tests, rig_open, rig_close);
 }

@@ -7,19 +7,6 @@
 #define SETTLE_MS 3000
 #define WINDOW_MS 2000
 
-static struct table_file file;
-
-static int open_reference(void **state) {
-    (void)state;
-    return table_file_open(&file, RIG_TABLE, NULL);
-}
-
-static int close_reference(void **state) {
-    (void)state;
-    table_file_close(&file);
-    return 0;
-}
-
 struct error {
     double bend_rms_deg;
     double direction_rms_deg;
@@ -57,7 +44,7 @@ static void bends_from_10_to_90_degrees_in_every_direction(void **state) {
     for (size_t b = 0; b < sizeof bends_deg / sizeof bends_deg[0]; b++) {
         for (int d = 0; d < 16; d++) {
             const struct controller_command command = rig_bend(bends_deg[b], -180.0 + 22.5 * d);
-            rig_start(&rig, &file.table, 1000u * b + (uint64_t)d);
+            rig_start(&rig, &rig_file.table, 1000u * b + (uint64_t)d);
             rig_command(&rig, &command);
             rig_run(&rig, SETTLE_MS);
             const struct error error = steady_error(&rig, &command);
@@ -82,7 +69,7 @@ static void the_tip_loop_takes_out_creep_that_open_loop_leaves(void **state) {
     for (int open_loop = 0; open_loop < 2; open_loop++) {
         struct effect creep;
         const struct controller_command command = rig_bend(45.0, 100.0);
-        rig_start(&rig, &file.table, 11);
+        rig_start(&rig, &rig_file.table, 11);
         assert_true(effect_parse("creep:amplitude=0.2,time_constant=0.5", &creep, text, sizeof text));
         assert_true(sim_add_effect(&rig.sim.sim, &creep));
         rig.sim.sim.faults.tip_stops = open_loop == 1;
@@ -99,16 +86,16 @@ static void an_unreachable_bend_stops_at_the_limit_and_says_so(void **state) {
     (void)state;
     static struct rig rig;
     const struct controller_command command = rig_bend(170.0, 30.0);
-    rig_start(&rig, &file.table, 3);
+    rig_start(&rig, &rig_file.table, 3);
     rig_command(&rig, &command);
     for (int i = 0; i < 4000; i++) {
         rig_step(&rig);
         for (size_t c = 0; c < 3; c++) {
-            assert_under(rig.sim.sim.chambers.pressure_pa[c], (double)file.table.module.working_pressure_pa * 1.03);
+            assert_under(rig.sim.sim.chambers.pressure_pa[c], (double)rig_file.table.module.working_pressure_pa * 1.03);
         }
     }
     assert_true((rig.report.status.warnings & (1u << WARNING_COMMAND_LIMITED)) != 0u);
-    assert_close(DEGREES * (double)rig.report.status.bend_rad, DEGREES * (double)file.table.module.bend_limit_rad, 2.0);
+    assert_close(DEGREES * (double)rig.report.status.bend_rad, DEGREES * (double)rig_file.table.module.bend_limit_rad, 2.0);
     assert_int_equal(rig.report.status.state, SUPERVISOR_ACTIVE);
 }
 
@@ -121,7 +108,7 @@ static void commands_that_make_no_sense_are_refused_and_counted(void **state) {
         {.kind = COMMAND_BEND, .bend_rad = 0.5f, .direction_rad = INFINITY},
         {.kind = COMMAND_BEND, .bend_rad = 0.5f, .co_contraction_pa = NAN},
         {.kind = COMMAND_PRESSURE, .pressure_pa = {0.0f, NAN, 0.0f}}};
-    rig_start(&rig, &file.table, 4);
+    rig_start(&rig, &rig_file.table, 4);
     for (size_t i = 0; i < sizeof bad / sizeof bad[0]; i++) {
         assert_true(rig.link.send(rig.link.context, &bad[i]));
         rig_step(&rig);
@@ -135,7 +122,7 @@ static void hold_keeps_the_pressures(void **state) {
     (void)state;
     static struct rig rig;
     const struct controller_command move = rig_pressure(6000.0, 3000.0, 0.0), hold = {.kind = COMMAND_HOLD};
-    rig_start(&rig, &file.table, 5);
+    rig_start(&rig, &rig_file.table, 5);
     rig_command(&rig, &move);
     rig_run(&rig, 1500);
     rig_command(&rig, &hold);
@@ -149,7 +136,7 @@ static void a_vent_command_empties_every_chamber(void **state) {
     (void)state;
     static struct rig rig;
     const struct controller_command move = rig_bend(80.0, 0.0), vent = {.kind = COMMAND_VENT};
-    rig_start(&rig, &file.table, 6);
+    rig_start(&rig, &rig_file.table, 6);
     rig_command(&rig, &move);
     rig_run(&rig, 2000);
     rig_command(&rig, &vent);
@@ -168,9 +155,9 @@ static void the_same_seed_gives_the_same_bits_another_does_not(void **state) {
     (void)state;
     static struct rig first, second, other;
     const struct controller_command command = rig_bend(50.0, 75.0);
-    rig_start(&first, &file.table, 42);
-    rig_start(&second, &file.table, 42);
-    rig_start(&other, &file.table, 43);
+    rig_start(&first, &rig_file.table, 42);
+    rig_start(&second, &rig_file.table, 42);
+    rig_start(&other, &rig_file.table, 43);
     rig_command(&first, &command);
     rig_command(&second, &command);
     rig_command(&other, &command);
@@ -201,5 +188,5 @@ int main(void) {
         cmocka_unit_test(a_vent_command_empties_every_chamber),
         cmocka_unit_test(the_same_seed_gives_the_same_bits_another_does_not),
     };
-    return cmocka_run_group_tests(tests, open_reference, close_reference);
+    return cmocka_run_group_tests(tests, rig_open, rig_close);
 }

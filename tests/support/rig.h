@@ -17,6 +17,19 @@ struct rig {
     bool silent;                       /* the host sends no more */
 };
 
+static struct table_file rig_file; /* the reference table, between the group's set-up and tear-down */
+
+static inline int rig_open(void **state) {
+    (void)state;
+    return table_file_open(&rig_file, RIG_TABLE, NULL);
+}
+
+static inline int rig_close(void **state) {
+    (void)state;
+    table_file_close(&rig_file);
+    return 0;
+}
+
 /* Up to SAFE. */
 static inline void rig_start(struct rig *rig, const struct bend_table *table, uint64_t seed) {
     memset(rig, 0, sizeof *rig);
