@@ -94,7 +94,7 @@ static int run(struct arguments *arguments) {
     struct description_error error;
     struct table_image image;
     bool terminal = isatty(STDERR_FILENO) != 0;
-    cli_module_path(arguments->module, path);
+    cli_table_path("modules", arguments->module, path);
     if (!module_description_read(path, arguments->material, &module, &error)) {
         return program_fail(EXIT_BAD_INPUT, "%s", error.text);
     }

@@ -13,10 +13,11 @@ int cli_build(int argc, char **argv);
 int cli_show(int argc, char **argv);
 int cli_plot(int argc, char **argv);
 int cli_fit(int argc, char **argv);
+int cli_material(int argc, char **argv);
 int cli_published(int argc, char **argv);
 
-/* The file of a module: `name` itself where it is a path, else tables/modules/NAME.yaml. */
-void cli_module_path(const char *name, char path[PROGRAM_PATH_BYTES]);
+/* The file of a module or material: `name` itself where it is a path, else tables/FOLDER/NAME.yaml. */
+void cli_table_path(const char *folder, const char *name, char path[PROGRAM_PATH_BYTES]);
 /* An element size from the command line, or argp's complaint. */
 void cli_mesh_size(struct argp_state *state, const char *argument, double *size_m);
 void cli_print_material(const struct material *material);

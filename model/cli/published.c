@@ -214,14 +214,13 @@ static void print_trends(const struct material *material) {
 
 /* --- Ecoflex 0050: the printed Ogden law's uniaxial curve, refitted by a stable law --- */
 
-static double ogden_uniaxial_pa(double stretch) {
-    static const double alpha[3] = {1.55, 7.86, -1.91}, l_pa[3] = {107900.0, 21.47, -87100.0};
-    double stress_pa = 0.0;
-    for (size_t i = 0; i < 3; i++) {
-        stress_pa += 2.0 * l_pa[i] / alpha[i] * (pow(stretch, alpha[i] - 1.0) - pow(stretch, -0.5 * alpha[i] - 1.0));
-    }
-    return stress_pa;
-}
+static const struct material ogden_0050 = {.name = "ecoflex-0050-printed",
+                                           .law = MATERIAL_OGDEN,
+                                           .terms = 3,
+                                           .coefficient_pa = {107900.0, 21.47, -87100.0},
+                                           .exponent = {1.55, 7.86, -1.91},
+                                           .bulk_modulus_pa = 1e9,
+                                           .strain_max = 3.0};
 
 static void print_ecoflex_0050(const struct material *ecoflex_0030) {
     double strain[61], stress_pa[61];
@@ -229,10 +228,11 @@ static void print_ecoflex_0050(const struct material *ecoflex_0030) {
     struct material_fit fit;
     for (size_t i = 0; i < 61; i++) {
         strain[i] = 0.05 * (double)i;
-        stress_pa[i] = ogden_uniaxial_pa(1.0 + strain[i]);
+        stress_pa[i] = material_nominal_stress_pa(&ogden_0050, DEFORMATION_UNIAXIAL, 1.0 + strain[i]);
     }
-    const struct tensile_test curve = {61, strain, stress_pa};
-    if (!material_fit(&curve, MATERIAL_YEOH, 3, 3.0, &fit, message, sizeof message)) {
+    const struct tensile_test curve = {61, strain, stress_pa, DEFORMATION_UNIAXIAL};
+    const struct material_fit_options how = {MATERIAL_YEOH, 3, 3.0, true};
+    if (!material_fit(&curve, 1, &how, &fit, message, sizeof message)) {
         row("e50-pressure-ratio", "about 3", message, "failed", "");
         return;
     }

@@ -200,7 +200,7 @@ static int run(const struct arguments *arguments) {
     char path[PROGRAM_PATH_BYTES], message[PROGRAM_ERROR_BYTES];
     struct module_description module;
     struct description_error error;
-    cli_module_path(arguments->module, path);
+    cli_table_path("modules", arguments->module, path);
     if (!module_description_read(path, arguments->material, &module, &error)) {
         return program_fail(EXIT_BAD_INPUT, "%s", error.text);
     }

@@ -10,6 +10,8 @@ struct material_yaml {
     int law;
     double *coefficients_pa;
     unsigned coefficients_pa_count;
+    double *exponents;
+    unsigned exponents_count;
     double density_kgpm3;
     double bulk_modulus_pa;
     double strain_min;
@@ -21,13 +23,16 @@ static const cyaml_strval_t laws[] = {
     {"neo-hookean", MATERIAL_NEO_HOOKEAN},
     {"reduced-polynomial", MATERIAL_REDUCED_POLYNOMIAL},
     {"yeoh", MATERIAL_YEOH},
+    {"ogden", MATERIAL_OGDEN},
 };
 static const cyaml_schema_value_t coefficient = {CYAML_VALUE_FLOAT(CYAML_FLAG_DEFAULT, double)};
 static const cyaml_schema_field_t fields[] = {
     CYAML_FIELD_STRING_PTR("name", CYAML_FLAG_POINTER, struct material_yaml, name, 1, MATERIAL_NAME_BYTES - 1),
-    CYAML_FIELD_ENUM("law", CYAML_FLAG_STRICT, struct material_yaml, law, laws, 3),
+    CYAML_FIELD_ENUM("law", CYAML_FLAG_STRICT, struct material_yaml, law, laws, 4),
     CYAML_FIELD_SEQUENCE("coefficients_pa", CYAML_FLAG_POINTER, struct material_yaml, coefficients_pa, &coefficient, 1,
                          MATERIAL_TERMS_MAX),
+    CYAML_FIELD_SEQUENCE("exponents", CYAML_FLAG_POINTER | CYAML_FLAG_OPTIONAL, struct material_yaml, exponents,
+                         &coefficient, 0, MATERIAL_TERMS_MAX),
     CYAML_FIELD_FLOAT("density_kgpm3", CYAML_FLAG_DEFAULT, struct material_yaml, density_kgpm3),
     CYAML_FIELD_FLOAT("bulk_modulus_pa", CYAML_FLAG_DEFAULT, struct material_yaml, bulk_modulus_pa),
     CYAML_FIELD_FLOAT("strain_min", CYAML_FLAG_DEFAULT, struct material_yaml, strain_min),
@@ -35,6 +40,31 @@ static const cyaml_schema_field_t fields[] = {
     CYAML_FIELD_STRING_PTR("source", CYAML_FLAG_POINTER, struct material_yaml, source, 1, 511),
     CYAML_FIELD_END};
 static const cyaml_schema_value_t schema = {CYAML_VALUE_MAPPING(CYAML_FLAG_POINTER, struct material_yaml, fields)};
+
+static double shear_modulus_pa(const struct material_yaml *yaml) {
+    double sum = 0.0;
+    for (unsigned i = 0; i < yaml->coefficients_pa_count; i++) {
+        sum += yaml->coefficients_pa[i];
+    }
+    return yaml->law == MATERIAL_OGDEN ? sum : 2.0 * yaml->coefficients_pa[0];
+}
+
+static bool check_exponents(const char *path, const struct material_yaml *yaml, struct description_error *error) {
+    const unsigned wanted = yaml->law == MATERIAL_OGDEN ? yaml->coefficients_pa_count : 0;
+    if (yaml->exponents_count != wanted) {
+        return yaml_file_reject(error, path, yaml->exponents_count > 0 ? "exponents" : "law", 1,
+                                wanted == 0 ? "only ogden takes exponents: remove these %u"
+                                            : "ogden takes one exponent for each coefficient (exponents: [..]), not %u",
+                                yaml->exponents_count);
+    }
+    for (unsigned i = 0; i < wanted; i++) {
+        if (!isfinite(yaml->exponents[i]) || yaml->exponents[i] == 0.0) {
+            return yaml_file_reject(error, path, "exponents", 1, "exponent %u must be a finite number other than zero",
+                                    i + 1);
+        }
+    }
+    return true;
+}
 
 static bool check(const char *path, const struct material_yaml *yaml, struct description_error *error) {
     const unsigned count = yaml->coefficients_pa_count;
@@ -49,15 +79,20 @@ static bool check(const char *path, const struct material_yaml *yaml, struct des
             return yaml_file_reject(error, path, "coefficients_pa", 1, "coefficient %u is not a finite number", i + 1);
         }
     }
-    if (!(yaml->coefficients_pa[0] > 0.0)) {
-        return yaml_file_reject(error, path, "coefficients_pa", 1,
-                                "the first coefficient is half the shear modulus and must be above zero, not %g",
-                                yaml->coefficients_pa[0]);
+    if (!check_exponents(path, yaml, error)) {
+        return false;
     }
-    if (!(yaml->bulk_modulus_pa > 100.0 * yaml->coefficients_pa[0]) || !isfinite(yaml->bulk_modulus_pa)) {
+    const double modulus_pa = shear_modulus_pa(yaml);
+    if (!(modulus_pa > 0.0)) {
+        return yaml_file_reject(error, path, "coefficients_pa", 1,
+                                "the initial shear modulus (%s) must be above zero, not %g Pa",
+                                yaml->law == MATERIAL_OGDEN ? "the sum of the coefficients" : "twice the first coefficient",
+                                modulus_pa);
+    }
+    if (!(yaml->bulk_modulus_pa > 50.0 * modulus_pa) || !isfinite(yaml->bulk_modulus_pa)) {
         return yaml_file_reject(error, path, "bulk_modulus_pa", 1,
-                                "%g Pa is not that of a rubber; give over 100 times the first coefficient",
-                                yaml->bulk_modulus_pa);
+                                "%g Pa is not that of a rubber; give over 50 times the shear modulus of %g Pa",
+                                yaml->bulk_modulus_pa, modulus_pa);
     }
     if (!(yaml->density_kgpm3 > 0.0) || !isfinite(yaml->density_kgpm3)) {
         return yaml_file_reject(error, path, "density_kgpm3", 1, "must be above zero, not %g", yaml->density_kgpm3);
@@ -83,6 +118,9 @@ bool material_read(const char *path, struct material *material, struct descripti
         material->law = (enum material_law)yaml->law;
         material->terms = yaml->coefficients_pa_count;
         memcpy(material->coefficient_pa, yaml->coefficients_pa, material->terms * sizeof(double));
+        if (material->law == MATERIAL_OGDEN) {
+            memcpy(material->exponent, yaml->exponents, material->terms * sizeof(double));
+        }
         material->bulk_modulus_pa = yaml->bulk_modulus_pa;
         material->density_kgpm3 = yaml->density_kgpm3;
         material->strain_min = yaml->strain_min;

@@ -259,6 +259,9 @@ unsigned long long module_description_hash(const struct module_description *modu
     }
     for (size_t i = 0; i < module->material.terms; i++) {
         hash = hash_number(hash, module->material.coefficient_pa[i]);
+        if (module->material.law == MATERIAL_OGDEN) {
+            hash = hash_number(hash, module->material.exponent[i]);
+        }
     }
     for (size_t c = 0; c < MODULE_CHAMBERS; c++) {
         for (size_t k = 0; k < module->chamber[c].cavity_count; k++) {

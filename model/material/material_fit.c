@@ -1,210 +1,266 @@
+/* Every law is linear in its coefficients, so these follow from a linear least squares for given exponents; bounds on
+ * their signs are met by trying every subset of terms (three at most), which finds the constrained optimum exactly.
+ * Ogden's exponents are searched by the simplex of Nelder and Mead 1965 from several starts (variable projection). */
 #include "material/material_fit.h"
 
-#include <errno.h>
 #include <gsl/gsl_multifit.h>
+#include <gsl/gsl_multimin.h>
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 
-#define LINE_BYTES 512
-#define COLUMNS 5
-#define COLUMN_STRAIN 3
-#define COLUMN_STRESS 4
-#define STABILITY_STEP 1e-3
 #define DEFAULT_BULK_MODULUS_PA 1e9
 #define DEFAULT_DENSITY_KGPM3 1070.0
-#define POINTS_LEAST 10
+#define EXPONENT_LEAST 0.1        /* free fits; below it a term is a logarithm */
+#define EXPONENT_LEAST_STABLE 1.0
+#define EXPONENT_MOST 20.0
+#define SIMPLEX_ITERATIONS_MAX 400
+#define SIMPLEX_SIZE 1e-5
 
-/* Numbers of one row; fewer than COLUMNS means a header line. */
-static int parse_row(const char *line, double value[COLUMNS]) {
-    int count = 0;
-    while (count < COLUMNS) {
-        char *end = NULL;
-        value[count] = strtod(line, &end);
-        if (end == line) {
-            break;
-        }
-        count++;
-        if (*end != ';') {
-            break;
-        }
-        line = end + 1;
-    }
-    return count;
-}
+struct point {
+    double stretch;
+    double stress_pa;
+    double weight; /* square root of its share over the test's greatest stress */
+    double scale_pa;
+    enum deformation_mode mode;
+};
 
-static bool append(struct tensile_test *test, size_t *room, double strain, double stress_pa) {
-    if (test->count == *room) {
-        *room = *room == 0 ? 256 : 2 * *room;
-        double *strains = realloc(test->strain, *room * sizeof(double));
-        if (strains != NULL) {
-            test->strain = strains;
-        }
-        double *stresses = realloc(test->stress_pa, *room * sizeof(double));
-        if (stresses != NULL) {
-            test->stress_pa = stresses;
-        }
-        if (strains == NULL || stresses == NULL) {
-            return false;
-        }
-    }
-    test->strain[test->count] = strain;
-    test->stress_pa[test->count++] = stress_pa;
-    return true;
-}
+struct fit_data {
+    const struct material_fit_options *options;
+    size_t count;
+    struct point *point;
+    double *unit; /* [count * terms] stress of each term with a coefficient of one */
+    gsl_matrix *design;
+    gsl_vector *stress;
+};
 
-bool tensile_test_read(const char *path, struct tensile_test *test, char *error, size_t error_bytes) {
-    memset(test, 0, sizeof *test);
-    FILE *file = fopen(path, "r");
-    if (file == NULL) {
-        (void)snprintf(error, error_bytes, "%s: %s", path, strerror(errno));
-        return false;
-    }
-    char line[LINE_BYTES];
-    size_t room = 0;
-    bool sound = true;
-    for (int number = 1; sound && fgets(line, sizeof line, file) != NULL; number++) {
-        double value[COLUMNS];
-        const int count = parse_row(line, value);
-        const bool blank = line[strspn(line, "; \t\r\n")] == '\0';
-        if (count == COLUMNS && isfinite(value[COLUMN_STRAIN]) && isfinite(value[COLUMN_STRESS])) {
-            sound = append(test, &room, value[COLUMN_STRAIN], 1e6 * value[COLUMN_STRESS]);
-            if (!sound) {
-                (void)snprintf(error, error_bytes, "%s:%d: out of memory", path, number);
-            }
-        } else if (test->count > 0 && !blank) {
-            (void)snprintf(error, error_bytes, "%s:%d: a row needs %d numbers parted by semicolons, this one has %d", path,
-                           number, COLUMNS, count);
-            sound = false;
-        }
-    }
-    (void)fclose(file);
-    if (sound && test->count < POINTS_LEAST) {
-        (void)snprintf(error, error_bytes,
-                       "%s: %zu rows of numbers, too few; expected time s;true strain;true stress MPa;engineering "
-                       "strain;engineering stress MPa",
-                       path, test->count);
-        sound = false;
-    }
-    if (!sound) {
-        tensile_test_free(test);
-    }
-    return sound;
-}
+/* --- points --- */
 
-void tensile_test_free(struct tensile_test *test) {
-    free(test->strain);
-    free(test->stress_pa);
-    memset(test, 0, sizeof *test);
-}
-
-static const double mode_exponent[DEFORMATION_MODES] = {-2.0, -3.0, -5.0};
-
-static double mode_i1(enum deformation_mode mode, double s) {
-    switch (mode) {
-    case DEFORMATION_UNIAXIAL:
-        return s * s + 2.0 / s;
-    case DEFORMATION_SHEAR:
-        return s * s + 1.0 + 1.0 / (s * s);
-    default:
-        return 2.0 * s * s + 1.0 / (s * s * s * s);
-    }
-}
-
-double material_nominal_stress_pa(const struct material *material, enum deformation_mode mode, double stretch) {
-    double w, dw, d2w;
-    material_energy(material, mode_i1(mode, stretch), &w, &dw, &d2w);
-    return 2.0 * (stretch - pow(stretch, mode_exponent[mode])) * dw;
-}
-
-double material_stable_stretch(const struct material *material, enum deformation_mode mode, double stretch_max) {
-    double last = 0.0;
-    for (int step = 1; 1.0 + step * STABILITY_STEP < stretch_max; step++) {
-        const double stretch = 1.0 + step * STABILITY_STEP;
-        const double stress = material_nominal_stress_pa(material, mode, stretch);
-        if (stress <= last) {
-            return stretch - STABILITY_STEP;
-        }
-        last = stress;
-    }
-    return stretch_max;
-}
-
-/* Row of the design matrix: d stress / d c_i = 2 (s - s^-2) i (I1 - 3)^(i - 1). */
-static void fill_row(gsl_matrix *design, size_t row, size_t terms, double stretch) {
-    const double x = mode_i1(DEFORMATION_UNIAXIAL, stretch) - 3.0;
-    double power = 1.0;
-    for (size_t i = 0; i < terms; i++) {
-        gsl_matrix_set(design, row, i, 2.0 * (stretch - 1.0 / (stretch * stretch)) * (double)(i + 1) * power);
-        power *= x;
-    }
-}
-
-static size_t select_rows(const struct tensile_test *test, double strain_max, size_t *rows) {
-    size_t count = 0;
+static double greatest_stress(const struct tensile_test *test, double strain_max, size_t *count) {
+    double greatest = 0.0;
+    *count = 0;
     for (size_t i = 0; i < test->count; i++) {
         if (test->strain[i] >= 0.0 && test->strain[i] <= strain_max) {
-            rows[count++] = i;
+            greatest = fmax(greatest, fabs(test->stress_pa[i]));
+            (*count)++;
         }
     }
-    return count;
+    return greatest;
 }
 
-static void measure_fit(const struct tensile_test *test, const size_t *rows, size_t count, struct material_fit *fit) {
-    double sum = 0.0, greatest = 0.0;
+static bool take_points(const struct tensile_test *tests, size_t test_count, struct fit_data *data, char *error,
+                        size_t error_bytes) {
+    size_t all = 0;
+    for (size_t t = 0; t < test_count; t++) {
+        all += tests[t].count;
+    }
+    data->point = calloc(all + 1, sizeof *data->point);
+    for (size_t t = 0; t < test_count && data->point != NULL; t++) {
+        size_t count = 0;
+        const double scale_pa = greatest_stress(&tests[t], data->options->strain_max, &count);
+        if (count < TENSILE_POINTS_LEAST || !(scale_pa > 0.0)) {
+            (void)snprintf(error, error_bytes, "%zu points up to %g %% strain in test %zu are too few for a fit", count,
+                           100.0 * data->options->strain_max, t + 1);
+            return false;
+        }
+        for (size_t i = 0; i < tests[t].count; i++) {
+            if (tests[t].strain[i] >= 0.0 && tests[t].strain[i] <= data->options->strain_max) {
+                data->point[data->count++] =
+                    (struct point){1.0 + tests[t].strain[i], tests[t].stress_pa[i],
+                                   1.0 / (scale_pa * sqrt((double)count)), scale_pa, tests[t].mode};
+            }
+        }
+    }
+    if (data->point == NULL) {
+        (void)snprintf(error, error_bytes, "out of memory for %zu points", all);
+    }
+    return data->point != NULL;
+}
+
+/* --- coefficients for given exponents --- */
+
+/* Least squares over the terms in `subset`; the sum of squares, or infinity where a bound is broken. */
+static double solve_subset(const struct fit_data *data, unsigned subset, struct material *material) {
+    const size_t terms = material->terms;
+    size_t used[MATERIAL_TERMS_MAX] = {0}, count = 0;
+    for (size_t k = 0; k < terms; k++) {
+        if ((subset >> k & 1u) != 0) {
+            used[count++] = k;
+        }
+    }
+    gsl_matrix_view design = gsl_matrix_submatrix(data->design, 0, 0, data->count, count);
+    for (size_t i = 0; i < data->count; i++) {
+        for (size_t k = 0; k < count; k++) {
+            gsl_matrix_set(&design.matrix, i, k, data->unit[i * terms + used[k]] * data->point[i].weight);
+        }
+    }
+    gsl_vector *answer = gsl_vector_alloc(count);
+    gsl_matrix *covariance = gsl_matrix_alloc(count, count);
+    gsl_multifit_linear_workspace *workspace = gsl_multifit_linear_alloc(data->count, count);
+    double squares = INFINITY;
+    if (gsl_multifit_linear(&design.matrix, data->stress, answer, covariance, &squares, workspace) != 0) {
+        squares = INFINITY;
+    }
+    memset(material->coefficient_pa, 0, sizeof material->coefficient_pa);
     for (size_t k = 0; k < count; k++) {
-        const double strain = test->strain[rows[k]], stress = test->stress_pa[rows[k]];
-        const double gap = material_nominal_stress_pa(&fit->material, DEFORMATION_UNIAXIAL, 1.0 + strain) - stress;
+        const double value = gsl_vector_get(answer, k);
+        material->coefficient_pa[used[k]] = value;
+        squares = data->options->stable && value < 0.0 ? INFINITY : squares;
+    }
+    gsl_multifit_linear_free(workspace);
+    gsl_matrix_free(covariance);
+    gsl_vector_free(answer);
+    return squares;
+}
+
+static double solve_coefficients(const struct fit_data *data, struct material *material) {
+    for (size_t k = 0; k < material->terms; k++) {
+        struct material one = *material;
+        memset(one.coefficient_pa, 0, sizeof one.coefficient_pa);
+        one.coefficient_pa[k] = 1.0;
+        for (size_t i = 0; i < data->count; i++) {
+            data->unit[i * material->terms + k] =
+                material_nominal_stress_pa(&one, data->point[i].mode, data->point[i].stretch);
+        }
+    }
+    const unsigned all = (1u << material->terms) - 1u;
+    double least = solve_subset(data, all, material);
+    struct material best = *material;
+    /* where the whole set breaks a bound, the optimum has some coefficient at zero */
+    for (unsigned subset = 1; subset < all && data->options->stable; subset++) {
+        struct material trial = *material;
+        const double squares = solve_subset(data, subset, &trial);
+        if (squares < least) {
+            least = squares;
+            best = trial;
+        }
+    }
+    *material = best;
+    return least;
+}
+
+/* --- Ogden's exponents --- */
+
+struct search {
+    const struct fit_data *data;
+    struct material material;
+};
+
+/* Into the allowed range, with the distance outside it as a penalty. */
+static double bounded_exponent(const struct fit_data *data, double value, double *outside) {
+    const double least = data->options->stable ? EXPONENT_LEAST_STABLE : EXPONENT_LEAST;
+    const double size = fmin(fmax(fabs(value), least), EXPONENT_MOST);
+    *outside += fabs(fabs(value) - size);
+    return copysign(size, value);
+}
+
+static double exponent_cost(const gsl_vector *exponents, void *context) {
+    struct search *search = context;
+    double outside = 0.0;
+    for (size_t k = 0; k < search->material.terms; k++) {
+        search->material.exponent[k] = bounded_exponent(search->data, gsl_vector_get(exponents, k), &outside);
+    }
+    const double squares = solve_coefficients(search->data, &search->material);
+    return isfinite(squares) ? log(squares + 1e-30) + outside : 1e3 + outside;
+}
+
+static double search_from(struct search *search, const double *start) {
+    const size_t terms = search->material.terms;
+    gsl_vector *at = gsl_vector_alloc(terms), *step = gsl_vector_alloc(terms);
+    gsl_multimin_fminimizer *minimiser = gsl_multimin_fminimizer_alloc(gsl_multimin_fminimizer_nmsimplex2, terms);
+    gsl_multimin_function cost = {exponent_cost, terms, search};
+    for (size_t k = 0; k < terms; k++) {
+        gsl_vector_set(at, k, start[k]);
+        gsl_vector_set(step, k, 0.3 * fabs(start[k]));
+    }
+    int status = gsl_multimin_fminimizer_set(minimiser, &cost, at, step);
+    for (int i = 0; i < SIMPLEX_ITERATIONS_MAX && status == 0; i++) {
+        status = gsl_multimin_fminimizer_iterate(minimiser);
+        if (status == 0 && gsl_multimin_fminimizer_size(minimiser) < SIMPLEX_SIZE) {
+            break;
+        }
+    }
+    const double least = exponent_cost(gsl_multimin_fminimizer_x(minimiser), search);
+    gsl_multimin_fminimizer_free(minimiser);
+    gsl_vector_free(step);
+    gsl_vector_free(at);
+    return least;
+}
+
+static double fit_ogden(const struct fit_data *data, struct material *material) {
+    static const double starts[][MATERIAL_TERMS_MAX] = {
+        {2.0, -2.0, 6.0}, {1.3, 5.0, -2.0}, {1.1, -4.0, 3.0}, {4.0, -1.2, 8.0}, {-2.0, 3.0, 1.5}};
+    double least = INFINITY;
+    for (size_t i = 0; i < sizeof starts / sizeof starts[0]; i++) {
+        struct search search = {data, *material};
+        const double cost = search_from(&search, starts[i]);
+        if (cost < least) {
+            least = cost;
+            *material = search.material;
+        }
+    }
+    return exp(least);
+}
+
+/* --- all --- */
+
+static void measure(const struct fit_data *data, struct material_fit *fit) {
+    double sum = 0.0, relative = 0.0;
+    for (size_t i = 0; i < data->count; i++) {
+        const struct point *point = &data->point[i];
+        const double gap = material_nominal_stress_pa(&fit->material, point->mode, point->stretch) - point->stress_pa;
         sum += gap * gap;
-        greatest = fmax(greatest, stress);
-        fit->material.strain_max = fmax(fit->material.strain_max, strain);
+        relative += gap * gap / (point->scale_pa * point->scale_pa);
+        fit->material.strain_max = fmax(fit->material.strain_max, point->stretch - 1.0);
         if (fabs(gap) > fit->most_pa) {
             fit->most_pa = fabs(gap);
-            fit->most_strain = strain;
+            fit->most_strain = point->stretch - 1.0;
         }
     }
-    fit->points = count;
-    fit->rms_pa = sqrt(sum / (double)count);
-    fit->rms_relative = fit->rms_pa / greatest;
+    const double count = (double)data->count;
+    fit->points = data->count;
+    fit->parameters = fit->material.terms * (fit->material.law == MATERIAL_OGDEN ? 2 : 1);
+    fit->rms_pa = sqrt(sum / count);
+    fit->rms_relative = sqrt(relative / count);
+    fit->aic = count * log(relative / count + 1e-30) + 2.0 * (double)(fit->parameters + 1);
 }
 
-bool material_fit(const struct tensile_test *test, enum material_law law, size_t terms, double strain_max,
+bool material_fit(const struct tensile_test *tests, size_t test_count, const struct material_fit_options *options,
                   struct material_fit *fit, char *error, size_t error_bytes) {
-    size_t *rows = malloc(test->count * sizeof *rows);
-    const size_t count = rows == NULL ? 0 : select_rows(test, strain_max, rows);
-    if (count < POINTS_LEAST || terms == 0 || terms > MATERIAL_TERMS_MAX) {
-        (void)snprintf(error, error_bytes, "%zu points up to %g %% strain are too few for a fit of %zu terms", count,
-                       100.0 * strain_max, terms);
-        free(rows);
+    struct fit_data data = {.options = options};
+    if (options->terms == 0 || options->terms > MATERIAL_TERMS_MAX) {
+        (void)snprintf(error, error_bytes, "a law takes 1 to %d terms, not %zu", MATERIAL_TERMS_MAX, options->terms);
         return false;
     }
-    gsl_matrix *design = gsl_matrix_alloc(count, terms), *covariance = gsl_matrix_alloc(terms, terms);
-    gsl_vector *stress = gsl_vector_alloc(count), *coefficient = gsl_vector_alloc(terms);
-    gsl_multifit_linear_workspace *workspace = gsl_multifit_linear_alloc(count, terms);
-    for (size_t k = 0; k < count; k++) {
-        fill_row(design, k, terms, 1.0 + test->strain[rows[k]]);
-        gsl_vector_set(stress, k, test->stress_pa[rows[k]]);
+    if (!take_points(tests, test_count, &data, error, error_bytes)) {
+        free(data.point);
+        return false;
     }
-    double squares = 0.0;
-    const int status = gsl_multifit_linear(design, stress, coefficient, covariance, &squares, workspace);
     memset(fit, 0, sizeof *fit);
-    fit->material.law = law;
-    fit->material.terms = terms;
+    fit->material.law = options->law;
+    fit->material.terms = options->terms;
     fit->material.bulk_modulus_pa = DEFAULT_BULK_MODULUS_PA;
     fit->material.density_kgpm3 = DEFAULT_DENSITY_KGPM3;
-    for (size_t i = 0; i < terms; i++) {
-        fit->material.coefficient_pa[i] = gsl_vector_get(coefficient, i);
+    data.unit = calloc(data.count * options->terms + 1, sizeof(double));
+    data.design = gsl_matrix_alloc(data.count, options->terms);
+    data.stress = gsl_vector_alloc(data.count);
+    double squares = INFINITY;
+    if (data.unit != NULL && data.design != NULL && data.stress != NULL) {
+        for (size_t i = 0; i < data.count; i++) {
+            gsl_vector_set(data.stress, i, data.point[i].stress_pa * data.point[i].weight);
+        }
+        squares = options->law == MATERIAL_OGDEN ? fit_ogden(&data, &fit->material)
+                                                 : solve_coefficients(&data, &fit->material);
     }
-    measure_fit(test, rows, count, fit);
-    gsl_multifit_linear_free(workspace);
-    gsl_vector_free(coefficient);
-    gsl_vector_free(stress);
-    gsl_matrix_free(covariance);
-    gsl_matrix_free(design);
-    free(rows);
-    if (status != 0) {
-        (void)snprintf(error, error_bytes, "the least squares failed");
+    if (isfinite(squares)) {
+        measure(&data, fit);
+    } else {
+        (void)snprintf(error, error_bytes, "the least squares found no answer: does the stress rise with the strain?");
     }
-    return status == 0;
+    gsl_vector_free(data.stress);
+    gsl_matrix_free(data.design);
+    free(data.unit);
+    free(data.point);
+    return isfinite(squares);
 }

@@ -1,41 +1,34 @@
-/* Fit of a reduced polynomial law to a uniaxial tensile test, and whether a law is stable. Units: Pa, stretch. */
+/* Fit of a material law to one or several tensile tests by least squares of the nominal stress. Units: Pa, stretch. */
 #ifndef TRIBEND_MATERIAL_FIT_H
 #define TRIBEND_MATERIAL_FIT_H
 
-#include <stdbool.h>
+#include "material/tensile_test.h"
 
-#include "material/material.h"
-
-struct tensile_test {
-    size_t count;
-    double *strain;    /* engineering */
-    double *stress_pa; /* nominal */
+struct material_fit_options {
+    enum material_law law;
+    size_t terms;
+    double strain_max; /* fit over strains [0, strain_max] */
+    /* Bounds that keep the law stable at every stretch: c_i >= 0, and |a_i| >= 1 for
+     * Ogden, whose energy is then polyconvex (Ball 1977). Without them a fit may turn just beyond its data. */
+    bool stable;
 };
 
 struct material_fit {
     struct material material; /* name and source are the caller's to fill */
     size_t points;
+    size_t parameters;
     double rms_pa;
-    double rms_relative;  /* of the greatest stress in the range */
-    double most_pa;       /* greatest deviation, and where */
+    double rms_relative; /* each test over its own greatest stress */
+    double most_pa;      /* greatest deviation, and where */
     double most_strain;
+    /* Akaike's criterion, n ln(sum of relative squares / n) + 2 (parameters + 1): less is better; only differences
+     * between laws on the same data mean anything (Burnham and Anderson 2002). */
+    double aic;
 };
 
-enum deformation_mode { DEFORMATION_UNIAXIAL, DEFORMATION_SHEAR, DEFORMATION_EQUIBIAXIAL, DEFORMATION_MODES };
-
-/* Semicolon-separated text in latin-1: header lines, then time s; true strain; true stress MPa; engineering strain;
- * engineering stress MPa (as in the Soft Robotics Materials Database). False: `error` names file and line. */
-bool tensile_test_read(const char *path, struct tensile_test *test, char *error, size_t error_bytes);
-void tensile_test_free(struct tensile_test *test);
-
-/* Linear least squares of the nominal stress over strains [0, strain_max]. */
-bool material_fit(const struct tensile_test *test, enum material_law law, size_t terms, double strain_max,
+/* Every test counts alike: its stresses are taken over its greatest one, its squares over its number of points. False:
+ * `error` says why. */
+bool material_fit(const struct tensile_test *tests, size_t test_count, const struct material_fit_options *options,
                   struct material_fit *fit, char *error, size_t error_bytes);
-
-/* Nominal stress (Pa) of the incompressible law: 2 (s - s^-n) W'(I1), n = 2 uniaxial, 3 pure shear, 5 equibiaxial
- * (Treloar 1975). */
-double material_nominal_stress_pa(const struct material *material, enum deformation_mode mode, double stretch);
-/* Stretch above one at which the nominal stress first falls, or `stretch_max` when it never does. */
-double material_stable_stretch(const struct material *material, enum deformation_mode mode, double stretch_max);
 
 #endif

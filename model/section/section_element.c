@@ -68,49 +68,46 @@ void element_deformation(const struct gauss_point *point, size_t index, double p
     gradient[4] = globals->stretch + globals->curvature[0] * y[1] - globals->curvature[1] * y[0];
 }
 
-/* H = d ln J / dG and dH/dG; J = (F11 F22 - F12 F21) F33. */
-static void log_jacobian(const double g[5], double h[5], double dh[5][5]) {
-    const double area = g[0] * g[3] - g[1] * g[2];
-    const double values[5] = {g[3] / area, -g[2] / area, -g[1] / area, g[0] / area, 1.0 / g[4]};
-    memcpy(h, values, sizeof values);
-    memset(dh, 0, 25 * sizeof(double));
-    for (size_t i = 0; i < 4; i++) {
-        for (size_t j = 0; j < 4; j++) {
-            dh[i][j] = -h[i] * h[j];
-        }
-    }
-    dh[0][3] += 1.0 / area;
-    dh[3][0] += 1.0 / area;
-    dh[1][2] -= 1.0 / area;
-    dh[2][1] -= 1.0 / area;
-    dh[4][4] = -1.0 / (g[4] * g[4]);
-}
-
-/* I1bar = J^(-2/3) F:F, the first invariant of the isochoric left Cauchy-Green tensor (Holzapfel 2000, eq. 6.109). */
+/* By the chain rule through i = F2:F2, j = det F2 and s = F33; the volume ratio is j s. */
 void point_response(const double g[5], double pressure, const struct material *material, double modulus_pa,
                     struct point_response *response) {
-    double h[5], dh[5][5], w, dw, d2w, di[5];
-    log_jacobian(g, h, dh);
-    const double jacobian = (g[0] * g[3] - g[1] * g[2]) * g[4];
-    const double scale = pow(jacobian, -2.0 / 3.0);
-    const double i1 = g[0] * g[0] + g[1] * g[1] + g[2] * g[2] + g[3] * g[3] + g[4] * g[4];
-    material_energy(material, scale * i1, &w, &dw, &d2w);
-    dw /= modulus_pa;
-    d2w /= modulus_pa;
-    for (size_t i = 0; i < 5; i++) {
-        di[i] = scale * (2.0 * g[i] - 2.0 / 3.0 * i1 * h[i]);
-        response->dj[i] = jacobian * h[i];
-        response->stress[i] = dw * di[i] + pressure * response->dj[i];
-    }
-    for (size_t i = 0; i < 5; i++) {
-        for (size_t j = 0; j < 5; j++) {
-            const double d2i = scale * ((i == j ? 2.0 : 0.0) - 4.0 / 3.0 * (g[i] * h[j] + h[i] * g[j]) +
-                                        4.0 / 9.0 * i1 * h[i] * h[j] - 2.0 / 3.0 * i1 * dh[i][j]);
-            response->stiffness[i][j] = d2w * di[i] * di[j] + dw * d2i + pressure * jacobian * (h[i] * h[j] + dh[i][j]);
+    const double j = g[0] * g[3] - g[1] * g[2], s = g[4];
+    const double cofactor[5] = {g[3], -g[2], -g[1], g[0], 0.0};
+    const double by[3][5] = {{2.0 * g[0], 2.0 * g[1], 2.0 * g[2], 2.0 * g[3], 0.0},
+                             {cofactor[0], cofactor[1], cofactor[2], cofactor[3], 0.0},
+                             {0.0, 0.0, 0.0, 0.0, 1.0}};
+    struct material_response law;
+    material_respond(material, g[0] * g[0] + g[1] * g[1] + g[2] * g[2] + g[3] * g[3], j, s, &law);
+    for (size_t m = 0; m < 3; m++) {
+        law.first[m] /= modulus_pa;
+        for (size_t n = 0; n < 3; n++) {
+            law.second[m][n] /= modulus_pa;
         }
     }
-    response->jacobian = jacobian;
-    response->energy = w / modulus_pa;
+    for (size_t k = 0; k < 5; k++) {
+        response->dj[k] = s * cofactor[k] + (k == 4 ? j : 0.0);
+        response->stress[k] =
+            law.first[0] * by[0][k] + law.first[1] * by[1][k] + law.first[2] * by[2][k] + pressure * response->dj[k];
+        double part[3];
+        for (size_t n = 0; n < 3; n++) {
+            part[n] = law.second[n][0] * by[0][k] + law.second[n][1] * by[1][k] + law.second[n][2] * by[2][k];
+        }
+        for (size_t l = 0; l <= k; l++) {
+            const double squeeze = (k == 4 ? cofactor[l] : 0.0) + (l == 4 ? cofactor[k] : 0.0);
+            response->stiffness[k][l] = part[0] * by[0][l] + part[1] * by[1][l] + part[2] * by[2][l] + pressure * squeeze;
+            response->stiffness[l][k] = response->stiffness[k][l];
+        }
+    }
+    for (size_t k = 0; k < 4; k++) {
+        response->stiffness[k][k] += 2.0 * law.first[0];
+    }
+    const double bend = law.first[1] + pressure * s; /* second derivative of j */
+    response->stiffness[0][3] += bend;
+    response->stiffness[3][0] += bend;
+    response->stiffness[1][2] -= bend;
+    response->stiffness[2][1] -= bend;
+    response->jacobian = j * s;
+    response->energy = law.energy / modulus_pa;
 }
 
 /* Derivative of the deformation gradient by the local displacements, then stretch and the two curvatures: columns of

@@ -53,6 +53,11 @@ sed 's/^law: .*/law: hooke/' tables/materials/ecoflex-0030-positive.yaml >"$scra
 expect law_unknown 3 'law|hooke' "$tables" solve paper-semicircle --material "$scratch/materials/bad-law.yaml" --to 5deg
 sed '/^bulk/d' tables/materials/ecoflex-0030-positive.yaml >"$scratch/materials/no-bulk.yaml"
 expect material_key_missing 3 'bulk_modulus_pa' "$tables" solve paper-semicircle --material "$scratch/materials/no-bulk.yaml" --to 5deg
+sed '/^exponents/d' tables/materials/ecoflex-0030-measured-ogden.yaml >"$scratch/materials/no-exponents.yaml"
+expect ogden_without_exponents 3 'one exponent for each' "$tables" material "$scratch/materials/no-exponents.yaml"
+sed 's/^law: .*/law: yeoh\nexponents: [1, 2, 3]/' tables/materials/ecoflex-0030-positive.yaml >"$scratch/materials/exponents.yaml"
+expect exponents_of_no_use 3 'only ogden' "$tables" material "$scratch/materials/exponents.yaml"
+expect material_name_unknown 3 'unobtainium' "$tables" material unobtainium
 expect output_folder_missing 5 '/nowhere' "$tables" solve paper-semicircle --to 2deg --csv /nowhere/path.csv
 
 # --- tables

@@ -140,10 +140,11 @@ static double tube_pressure(const struct tube *tube, double a, double z, double 
             const double dr = (b - a) / PARTS, r = a + (i + 0.5) * dr;
             const double rest = sqrt(tube->inner_m * tube->inner_m + (r * r - a * a) * z);
             const double hoop = r / rest, through = rest / (r * z);
-            double w, dw, d2w;
-            material_energy(tube->material, hoop * hoop + through * through + z * z, &w, &dw, &d2w);
-            const double slope = 2.0 * dw * (hoop * hoop - through * through) / r;
-            sum += (radial + 0.5 * dr * slope + 2.0 * dw * (z * z - through * through)) * 2.0 * M_PI * r * dr;
+            const double stretch[3] = {hoop, through, z};
+            double by[3], ignored[3][3];
+            material_principal(tube->material, stretch, by, ignored);
+            const double slope = (hoop * by[0] - through * by[1]) / r;
+            sum += (radial + 0.5 * dr * slope + z * by[2] - through * by[1]) * 2.0 * M_PI * r * dr;
             radial += dr * slope;
         }
         if (pass == 0) {
