@@ -34,7 +34,10 @@ static struct module_description paper_module(enum cavity_shape shape, double ra
         const double azimuth = (double)c * 2.0 * M_PI / 3.0, centre_m = OUTER_M - wall_m - radius_m;
         module.chamber[c].cavity_count = 1;
         module.chamber[c].cavity[0] =
-            (struct cavity){shape, {centre_m * cos(azimuth), centre_m * sin(azimuth)}, radius_m, azimuth};
+            (struct cavity){.shape = shape,
+                            .centre_m = {centre_m * cos(azimuth), centre_m * sin(azimuth)},
+                            .radius_m = radius_m,
+                            .orientation_rad = azimuth};
     }
     return module;
 }

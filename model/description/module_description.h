@@ -6,29 +6,34 @@
 #include <stdbool.h>
 #include <stddef.h>
 
+#include "description/cavity.h"
 #include "material/material.h"
 
 #define MODULE_NAME_BYTES 32
 #define MODULE_CHAMBERS 3
 #define MODULE_CAVITIES_MAX 4
-
-enum cavity_shape { CAVITY_CIRCLE, CAVITY_SEMICIRCLE };
-
-struct cavity {
-    enum cavity_shape shape;
-    double centre_m[2];     /* of the circle, or of the middle of the semicircle's flat side */
-    double radius_m;
-    double orientation_rad; /* semicircle: where its round side points */
-};
+#define MODULE_LAYERS_MAX 4
 
 struct chamber {
     size_t cavity_count;
     struct cavity cavity[MODULE_CAVITIES_MAX];
 };
 
+/* A ring of the section in a material of its own. Corrugated (an accordion of a stiffer rubber, its folds filled with
+ * the ring's material): the folds open along the axis and carry hoop stretch only, so they count as fibres round the
+ * axis with the uniaxial stress of `corrugation`, over `corrugation_fraction` of the ring's volume. */
+struct module_layer {
+    double inner_radius_m;
+    double outer_radius_m;
+    struct material material;
+    double corrugation_fraction; /* 0: not corrugated */
+    struct material corrugation;
+};
+
 struct module_description {
     char name[MODULE_NAME_BYTES];
     double outer_diameter_m;
+    double bore_diameter_m; /* 0: solid */
     double length_m;
     double chamber_length_m;
     double end_correction_m; /* added to the chamber length: bend = curvature * (chamber length + correction) */
@@ -36,6 +41,8 @@ struct module_description {
     double cap_distal_m;
     char material_name[MATERIAL_NAME_BYTES];
     struct material material;
+    size_t layer_count;
+    struct module_layer layer[MODULE_LAYERS_MAX];
     bool three_fold; /* chambers 2 and 3 are chamber 1 turned: the table needs one sixth */
     struct chamber chamber[MODULE_CHAMBERS];
     double working_pressure_pa;

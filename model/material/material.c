@@ -148,6 +148,25 @@ void material_principal(const struct material *material, const double stretch[3]
     }
 }
 
+void material_uniaxial(const struct material *material, double stretch, double *stress_pa, double *slope_pa) {
+    *stress_pa = 0.0;
+    *slope_pa = 0.0;
+    if (material->law == MATERIAL_OGDEN) {
+        for (size_t k = 0; k < material->terms; k++) {
+            const double a = material->exponent[k], along = pow(stretch, a), across = pow(stretch, -0.5 * a);
+            const double factor = 2.0 * material->coefficient_pa[k] / a;
+            *stress_pa += factor * (along - across) / stretch;
+            *slope_pa += factor * ((a - 1.0) * along + (0.5 * a + 1.0) * across) / (stretch * stretch);
+        }
+        return;
+    }
+    const double square = 1.0 / (stretch * stretch), shape = 2.0 * (stretch - square);
+    double w, dw, d2w;
+    polynomial(material, stretch * stretch + 2.0 / stretch - 3.0, &w, &dw, &d2w);
+    *stress_pa = shape * dw;
+    *slope_pa = (2.0 + 4.0 * square / stretch) * dw + shape * shape * d2w;
+}
+
 double material_shear_modulus(const struct material *material) {
     double sum = 0.0;
     for (size_t i = 0; i < material->terms; i++) {

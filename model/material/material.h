@@ -40,6 +40,8 @@ void material_respond(const struct material *material, double i, double j, doubl
 
 /* Derivatives of W by three principal stretches whose product is one (W extended without the isochoric factor). Pa. */
 void material_principal(const struct material *material, const double stretch[3], double first[3], double second[3][3]);
+/* Nominal stress of uniaxial tension (Pa) and its derivative by the stretch, free faces. */
+void material_uniaxial(const struct material *material, double stretch, double *stress_pa, double *slope_pa);
 /* Initial shear modulus, Pa: 2 c_1, or the sum of Ogden's c_i. */
 double material_shear_modulus(const struct material *material);
 

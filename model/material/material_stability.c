@@ -66,6 +66,15 @@ double material_ellipticity_margin(const struct material *material, const double
     return least / material_shear_modulus(material);
 }
 
+bool material_always_elliptic(const struct material *material) {
+    for (size_t k = 0; k < material->terms; k++) {
+        if (material->coefficient_pa[k] < 0.0 || (material->law == MATERIAL_OGDEN && fabs(material->exponent[k]) < 1.0)) {
+            return false;
+        }
+    }
+    return material_shear_modulus(material) > 0.0;
+}
+
 double material_elliptic_stretch(const struct material *material, enum deformation_mode mode, double stretch_max) {
     for (int step = 0; 1.0 + step * SEARCH_STEP < stretch_max; step++) {
         double all[3];

@@ -20,6 +20,8 @@ double material_stable_stretch(const struct material *material, enum deformation
  * direction in those planes have a real speed while it is above zero (Dowaikh and Ogden 1990, incompressible). Necessary
  * in three dimensions. Product of the stretches: one. */
 double material_ellipticity_margin(const struct material *material, const double stretch[3]);
+/* Is the law elliptic at every stretch by the signs of its coefficients alone (sufficient, not necessary)? */
+bool material_always_elliptic(const struct material *material);
 /* Stretch at which the margin is first not above zero, or `stretch_max`. */
 double material_elliptic_stretch(const struct material *material, enum deformation_mode mode, double stretch_max);
 

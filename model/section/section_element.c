@@ -68,29 +68,48 @@ void element_deformation(const struct gauss_point *point, size_t index, double p
     gradient[4] = globals->stretch + globals->curvature[0] * y[1] - globals->curvature[1] * y[0];
 }
 
+/* Hoop fibres: stress P(l) / l (F t) t with l = |F t| and the uniaxial stress P of the corrugation's rubber. */
+static void add_corrugation(const double hoop[2], const double g[5], const struct element_law *law, double modulus_pa,
+                            struct point_response *response) {
+    const double along[2] = {g[0] * hoop[0] + g[1] * hoop[1], g[2] * hoop[0] + g[3] * hoop[1]};
+    const double stretch = hypot(along[0], along[1]), share = law->corrugation_fraction / modulus_pa;
+    double stress = 0.0, slope = 0.0;
+    material_uniaxial(&law->corrugation, stretch, &stress, &slope);
+    const double tension = share * stress / stretch, stiffening = (share * slope - tension) / (stretch * stretch);
+    for (size_t k = 0; k < 4; k++) {
+        const double fk = along[k / 2] * hoop[k % 2];
+        response->stress[k] += tension * fk;
+        for (size_t l = 0; l < 4; l++) {
+            response->stiffness[k][l] += stiffening * fk * along[l / 2] * hoop[l % 2] +
+                                         (k / 2 == l / 2 ? tension * hoop[k % 2] * hoop[l % 2] : 0.0);
+        }
+    }
+}
+
 /* By the chain rule through i = F2:F2, j = det F2 and s = F33; the volume ratio is j s. */
-void point_response(const double g[5], double pressure, const struct material *material, double modulus_pa,
-                    struct point_response *response) {
+void point_response(const struct gauss_point *point, const double g[5], double pressure, const struct element_law *law,
+                    double modulus_pa, struct point_response *response) {
     const double j = g[0] * g[3] - g[1] * g[2], s = g[4];
     const double cofactor[5] = {g[3], -g[2], -g[1], g[0], 0.0};
     const double by[3][5] = {{2.0 * g[0], 2.0 * g[1], 2.0 * g[2], 2.0 * g[3], 0.0},
                              {cofactor[0], cofactor[1], cofactor[2], cofactor[3], 0.0},
                              {0.0, 0.0, 0.0, 0.0, 1.0}};
-    struct material_response law;
-    material_respond(material, g[0] * g[0] + g[1] * g[1] + g[2] * g[2] + g[3] * g[3], j, s, &law);
+    const double share = (1.0 - law->corrugation_fraction) / modulus_pa;
+    struct material_response rubber;
+    material_respond(&law->material, g[0] * g[0] + g[1] * g[1] + g[2] * g[2] + g[3] * g[3], j, s, &rubber);
     for (size_t m = 0; m < 3; m++) {
-        law.first[m] /= modulus_pa;
+        rubber.first[m] *= share;
         for (size_t n = 0; n < 3; n++) {
-            law.second[m][n] /= modulus_pa;
+            rubber.second[m][n] *= share;
         }
     }
     for (size_t k = 0; k < 5; k++) {
         response->dj[k] = s * cofactor[k] + (k == 4 ? j : 0.0);
         response->stress[k] =
-            law.first[0] * by[0][k] + law.first[1] * by[1][k] + law.first[2] * by[2][k] + pressure * response->dj[k];
+            rubber.first[0] * by[0][k] + rubber.first[1] * by[1][k] + rubber.first[2] * by[2][k] + pressure * response->dj[k];
         double part[3];
         for (size_t n = 0; n < 3; n++) {
-            part[n] = law.second[n][0] * by[0][k] + law.second[n][1] * by[1][k] + law.second[n][2] * by[2][k];
+            part[n] = rubber.second[n][0] * by[0][k] + rubber.second[n][1] * by[1][k] + rubber.second[n][2] * by[2][k];
         }
         for (size_t l = 0; l <= k; l++) {
             const double squeeze = (k == 4 ? cofactor[l] : 0.0) + (l == 4 ? cofactor[k] : 0.0);
@@ -99,15 +118,18 @@ void point_response(const double g[5], double pressure, const struct material *m
         }
     }
     for (size_t k = 0; k < 4; k++) {
-        response->stiffness[k][k] += 2.0 * law.first[0];
+        response->stiffness[k][k] += 2.0 * rubber.first[0];
     }
-    const double bend = law.first[1] + pressure * s; /* second derivative of j */
+    const double bend = rubber.first[1] + pressure * s; /* second derivative of j */
     response->stiffness[0][3] += bend;
     response->stiffness[3][0] += bend;
     response->stiffness[1][2] -= bend;
     response->stiffness[2][1] -= bend;
     response->jacobian = j * s;
-    response->energy = law.energy / modulus_pa;
+    response->energy = rubber.energy * share;
+    if (law->corrugation_fraction > 0.0) {
+        add_corrugation(point->hoop, g, law, modulus_pa, response);
+    }
 }
 
 /* Derivative of the deformation gradient by the local displacements, then stretch and the two curvatures: columns of
@@ -195,7 +217,7 @@ static void add_point(const struct gauss_point *point, const double *shape, cons
 
 bool element_assemble(const struct gauss_point point[ELEMENT_GAUSS_POINTS], double position[ELEMENT_NODES][2],
                       const double pressure[ELEMENT_CORNERS], const struct section_globals *globals,
-                      const struct material *material, double modulus_pa, double bulk, struct element_matrix *matrix) {
+                      const struct element_law *law, double modulus_pa, struct element_matrix *matrix) {
     memset(matrix, 0, sizeof *matrix);
     for (size_t g = 0; g < ELEMENT_GAUSS_POINTS; g++) {
         const double *shape = element_gauss_shape[g], *corner = element_gauss_corner[g];
@@ -213,8 +235,9 @@ bool element_assemble(const struct gauss_point point[ELEMENT_GAUSS_POINTS], doub
             return false;
         }
         struct point_response response;
-        point_response(gradient, q, material, modulus_pa, &response);
-        add_point(&point[g], shape, corner, y, globals, &response, response.jacobian - 1.0 - q / bulk, bulk, matrix);
+        point_response(&point[g], gradient, q, law, modulus_pa, &response);
+        add_point(&point[g], shape, corner, y, globals, &response, response.jacobian - 1.0 - q / law->bulk, law->bulk,
+                  matrix);
     }
     return true;
 }
@@ -258,6 +281,37 @@ void edge_assemble(double position[EDGE_NODES][2], const struct section_globals 
                 matrix->hessian[2 * a + 1][2 * b + 1] -= w * kx * dx * n[a] * n[b];
                 matrix->hessian[2 * a][2 * b + 1] += cross;
                 matrix->hessian[2 * b + 1][2 * a] += cross;
+            }
+        }
+    }
+}
+
+void fibre_assemble(double rest[EDGE_NODES][2], double position[EDGE_NODES][2], double stiffness,
+                    struct fibre_matrix *matrix) {
+    static const double station[3] = {-0.774596669241483, 0.0, 0.774596669241483};
+    static const double weight[3] = {5.0 / 9.0, 8.0 / 9.0, 5.0 / 9.0};
+    memset(matrix, 0, sizeof *matrix);
+    for (size_t g = 0; g < 3; g++) {
+        const double t = station[g], d[EDGE_NODES] = {t - 0.5, t + 0.5, -2 * t};
+        double before[2] = {0.0, 0.0}, after[2] = {0.0, 0.0};
+        for (size_t a = 0; a < EDGE_NODES; a++) {
+            for (size_t i = 0; i < 2; i++) {
+                before[i] += d[a] * rest[a][i];
+                after[i] += d[a] * position[a][i];
+            }
+        }
+        const double length = hypot(before[0], before[1]), now = hypot(after[0], after[1]), stretch = now / length;
+        if (stretch <= 1.0) {
+            continue;
+        }
+        /* dE = w length k (stretch - 1) d(stretch), d(stretch) = n . d(after) / length with n = after / now */
+        const double tension = weight[g] * stiffness * (stretch - 1.0), n[2] = {after[0] / now, after[1] / now};
+        for (size_t k = 0; k < EDGE_LOCAL; k++) {
+            matrix->gradient[k] += tension * n[k % 2] * d[k / 2];
+            for (size_t l = 0; l < EDGE_LOCAL; l++) {
+                const double both = d[k / 2] * d[l / 2], nn = n[k % 2] * n[l % 2];
+                matrix->hessian[k][l] += both * (weight[g] * stiffness / length * nn +
+                                                 tension / now * ((k % 2 == l % 2 ? 1.0 : 0.0) - nn));
             }
         }
     }

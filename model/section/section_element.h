@@ -28,6 +28,15 @@ struct section_globals {
 struct gauss_point {
     double gradient[ELEMENT_NODES][2]; /* of the six shape functions */
     double weight;
+    double hoop[2]; /* unit vector round the section's centre */
+};
+
+/* What a region of the section is made of. */
+struct element_law {
+    struct material material;
+    double bulk;                 /* bulk modulus over the solver's shear modulus */
+    double corrugation_fraction; /* of the volume; 0: plain */
+    struct material corrugation; /* carries hoop stretch only */
 };
 
 /* Stress and stiffness of the isochoric law and the pressure constraint at one deformation gradient. */
@@ -64,13 +73,22 @@ bool element_geometry(double position[ELEMENT_NODES][2], struct gauss_point poin
 /* `position` is the deformed one. */
 void element_deformation(const struct gauss_point *point, size_t index, double position[ELEMENT_NODES][2],
                          const struct section_globals *globals, double gradient[5]);
-void point_response(const double gradient[5], double pressure, const struct material *material, double modulus_pa,
-                    struct point_response *response);
-/* False where some Gauss point is turned inside out. `bulk` is the bulk modulus over the shear modulus. */
+/* Stress and stiffness at a Gauss point, corrugation included. Stresses over `modulus_pa`. */
+void point_response(const struct gauss_point *point, const double gradient[5], double pressure,
+                    const struct element_law *law, double modulus_pa, struct point_response *response);
+/* False where some Gauss point is turned inside out. */
 bool element_assemble(const struct gauss_point point[ELEMENT_GAUSS_POINTS], double position[ELEMENT_NODES][2],
                       const double pressure[ELEMENT_CORNERS], const struct section_globals *globals,
-                      const struct material *material, double modulus_pa, double bulk, struct element_matrix *matrix);
+                      const struct element_law *law, double modulus_pa, struct element_matrix *matrix);
 void edge_assemble(double position[EDGE_NODES][2], const struct section_globals *globals,
                    struct edge_matrix *matrix);
+/* Fibres along an edge, slack under compression: energy stiffness / 2 (stretch - 1)^2 a reference length while the
+ * stretch is above one. `stiffness` over shear modulus and outer radius. */
+struct fibre_matrix {
+    double gradient[EDGE_LOCAL];
+    double hessian[EDGE_LOCAL][EDGE_LOCAL];
+};
+void fibre_assemble(double rest[EDGE_NODES][2], double position[EDGE_NODES][2], double stiffness,
+                    struct fibre_matrix *matrix);
 
 #endif

@@ -15,15 +15,16 @@
 
 struct section_solver {
     const struct section_mesh *mesh;
-    struct material material;
-    double modulus_pa;
-    double bulk;        /* bulk over shear modulus */
+    struct element_law law[1 + MODULE_LAYERS_MAX]; /* by region */
+    double modulus_pa;  /* shear modulus of region 0 */
     double radius_m;
 
     /* numbering: sparse equations first (displacements, pressures at corners), then the bordered ones */
     size_t sparse_count;
     size_t *displacement_equation; /* [2 * node_count], NO_EQUATION where pinned */
-    size_t *pressure_equation;     /* [node_count], NO_EQUATION at mid-sides */
+    /* [node_count * region_count], NO_EQUATION at mid-sides; a corner between regions has a pressure in each, since the
+     * pressure jumps where the stiffness does */
+    size_t *pressure_equation;
     size_t pressure_count;
     size_t stabiliser;             /* equation whose diagonal is raised while factorising */
 
@@ -65,6 +66,7 @@ void section_deformed_triangle(const struct section_solver *solver, size_t trian
 bool section_linearise(struct section_solver *solver, const double direction[MODULE_CHAMBERS]);
 /* Greatest change of a displacement, the stretch or a curvature in `step`. */
 double section_largest_change(const struct section_solver *solver, const double *step);
+double section_corner_pressure(const struct section_solver *solver, size_t triangle, size_t corner);
 void section_globals_of(const struct section_solver *solver, struct section_globals *globals);
 
 #endif

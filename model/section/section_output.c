@@ -2,6 +2,7 @@
 #include <math.h>
 #include <string.h>
 
+#include "material/material_stability.h"
 #include "section/section_internal.h"
 
 #define WIDTH_DIRECTIONS 60    /* over 180 degrees */
@@ -32,8 +33,7 @@ static double width_along(const struct section_solver *solver, double x, double 
 static double triangle_q(const struct section_solver *solver, size_t triangle, size_t gauss) {
     double q = 0.0;
     for (size_t c = 0; c < ELEMENT_CORNERS; c++) {
-        q += element_gauss_corner[gauss][c] *
-             solver->unknown[solver->pressure_equation[solver->mesh->triangle[triangle][c]]];
+        q += element_gauss_corner[gauss][c] * section_corner_pressure(solver, triangle, c);
     }
     return q;
 }
@@ -46,11 +46,12 @@ static double von_mises(const double g[5], const struct point_response *response
     return sqrt(0.5 * ((xx - yy) * (xx - yy) + (yy - zz) * (yy - zz) + (zz - xx) * (zz - xx)) + 3.0 * xy * xy);
 }
 
-static double greatest_stretch(const double g[5]) {
+static void principal_stretches(const double g[5], double stretch[3]) {
     const double sum = g[0] * g[0] + g[1] * g[1] + g[2] * g[2] + g[3] * g[3];
     const double area = g[0] * g[3] - g[1] * g[2];
-    const double in_plane = sqrt(0.5 * (sum + sqrt(fmax(0.0, sum * sum - 4.0 * area * area))));
-    return fmax(in_plane, g[4]);
+    stretch[0] = sqrt(0.5 * (sum + sqrt(fmax(0.0, sum * sum - 4.0 * area * area))));
+    stretch[1] = area / stretch[0];
+    stretch[2] = g[4];
 }
 
 /* Is this undeformed point in the strip through the wall outside the apex of a chamber at `azimuth`? */
@@ -83,37 +84,44 @@ static void read_strains(const struct section_solver *solver, struct section_sta
     struct section_globals globals;
     section_globals_of(solver, &globals);
     state->stretch_max = 1.0;
+    state->elliptic = true;
     for (size_t t = 0; t < solver->mesh->triangle_count; t++) {
+        const struct element_law *law = &solver->law[solver->mesh->region[t]];
+        const bool doubtful = !material_always_elliptic(&law->material);
         double position[ELEMENT_NODES][2];
         section_deformed_triangle(solver, t, position);
         for (size_t p = 0; p < ELEMENT_GAUSS_POINTS; p++) {
-            double g[5], rest[2] = {0.0, 0.0};
+            double g[5], rest[2] = {0.0, 0.0}, stretch[3];
             element_deformation(&solver->gauss[t][p], p, position, &globals, g);
-            state->stretch_max = fmax(state->stretch_max, greatest_stretch(g));
+            principal_stretches(g, stretch);
+            const double most = fmax(stretch[0], stretch[2]);
+            state->stretch_max = fmax(state->stretch_max, most);
+            state->beyond_strain = state->beyond_strain || most > 1.0 + law->material.strain_max;
+            state->elliptic = state->elliptic && !(doubtful && material_ellipticity_margin(&law->material, stretch) <= 0.0);
             for (size_t a = 0; a < ELEMENT_NODES; a++) {
                 rest[0] += element_gauss_shape[p][a] * solver->rest[2 * solver->mesh->triangle[t][a]];
                 rest[1] += element_gauss_shape[p][a] * solver->rest[2 * solver->mesh->triangle[t][a] + 1];
             }
             if (in_apex_wall(rest, azimuth, apex)) {
                 struct point_response response;
-                point_response(g, triangle_q(solver, t, p), &solver->material, solver->modulus_pa, &response);
+                point_response(&solver->gauss[t][p], g, triangle_q(solver, t, p), law, solver->modulus_pa, &response);
                 stress += solver->gauss[t][p].weight * von_mises(g, &response);
                 weight += solver->gauss[t][p].weight;
             }
         }
     }
     state->von_mises_apex_pa = weight > 0.0 ? stress / weight * solver->modulus_pa : 0.0;
-    state->beyond_strain = state->stretch_max > 1.0 + solver->material.strain_max;
 }
 
 static double cross(const double a[2], const double b[2], const double c[2]) {
     return (b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0]);
 }
 
-/* Do two edges of one cavity, taken as chords, cross? Edges that share a node do not count. */
+/* Do two edges, taken as chords, cross? Edges that share a node do not count. */
 static bool edges_cross(const struct section_solver *solver, const struct section_edge *one,
                         const struct section_edge *other) {
-    if (one->node[0] == other->node[1] || one->node[1] == other->node[0]) {
+    if (one->node[0] == other->node[1] || one->node[1] == other->node[0] || one->node[0] == other->node[0] ||
+        one->node[1] == other->node[1]) {
         return false;
     }
     double a[2], b[2], c[2], d[2];
@@ -128,8 +136,7 @@ static bool walls_cross(const struct section_solver *solver) {
     const struct section_mesh *mesh = solver->mesh;
     for (size_t e = 0; e < mesh->edge_count; e++) {
         for (size_t f = e + 1; f < mesh->edge_count; f++) {
-            if (mesh->edge[e].chamber != SECTION_OUTLINE && mesh->edge[e].chamber == mesh->edge[f].chamber &&
-                edges_cross(solver, &mesh->edge[e], &mesh->edge[f])) {
+            if (mesh->edge[e].chamber == mesh->edge[f].chamber && edges_cross(solver, &mesh->edge[e], &mesh->edge[f])) {
                 return true;
             }
         }
@@ -143,7 +150,7 @@ static void read_volumes(const struct section_solver *solver, double volume_m2[M
     memset(volume_m2, 0, MODULE_CHAMBERS * sizeof(double));
     for (size_t e = 0; e < solver->mesh->edge_count; e++) {
         const struct section_edge *edge = &solver->mesh->edge[e];
-        if (edge->chamber != SECTION_OUTLINE) {
+        if (edge->chamber >= 0) {
             double position[EDGE_NODES][2];
             struct edge_matrix matrix;
             for (size_t a = 0; a < EDGE_NODES; a++) {
@@ -153,6 +160,23 @@ static void read_volumes(const struct section_solver *solver, double volume_m2[M
             volume_m2[edge->chamber] += matrix.volume * solver->radius_m * solver->radius_m;
         }
     }
+}
+
+static void bore_middle(const struct section_solver *solver, double middle[2]) {
+    double count = 0.0;
+    middle[0] = 0.0;
+    middle[1] = 0.0;
+    for (size_t e = 0; e < solver->mesh->edge_count; e++) {
+        if (solver->mesh->edge[e].chamber == SECTION_BORE) {
+            double position[2];
+            deformed_node(solver, solver->mesh->edge[e].node[2], position);
+            middle[0] += position[0];
+            middle[1] += position[1];
+            count += 1.0;
+        }
+    }
+    middle[0] /= count;
+    middle[1] /= count;
 }
 
 /* Chamber 1 (+x) under pressure lengthens the fibres at +x (curvature[1] < 0) and moves the tip towards -x: the
@@ -167,6 +191,11 @@ void section_solver_state(struct section_solver *solver, struct section_state *s
     state->curvature_x_1pm = globals.curvature[1] / solver->radius_m;
     state->curvature_y_1pm = -globals.curvature[0] / solver->radius_m;
     state->stretch = globals.stretch;
+    if (solver->mesh->bored) { /* the pinned node lies on the bore's wall: move to the deformed bore's middle */
+        double middle[2];
+        bore_middle(solver, middle);
+        state->stretch += globals.curvature[0] * middle[1] - globals.curvature[1] * middle[0];
+    }
     read_volumes(solver, state->volume_m2);
     const double curvature = hypot(state->curvature_x_1pm, state->curvature_y_1pm);
     const bool bent = curvature * solver->radius_m > 1e-9;
@@ -196,9 +225,10 @@ void section_solver_field(const struct section_solver *solver, double *position_
         section_deformed_triangle(solver, t, position);
         triangle_stretch[t] = 1.0;
         for (size_t p = 0; p < ELEMENT_GAUSS_POINTS; p++) {
-            double g[5];
+            double g[5], stretch[3];
             element_deformation(&solver->gauss[t][p], p, position, &globals, g);
-            triangle_stretch[t] = fmax(triangle_stretch[t], greatest_stretch(g));
+            principal_stretches(g, stretch);
+            triangle_stretch[t] = fmax(triangle_stretch[t], fmax(stretch[0], stretch[2]));
         }
     }
 }

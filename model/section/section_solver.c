@@ -40,18 +40,29 @@ static void set_error(struct description_error *error, const char *format, ...) 
 
 /* --- set-up --- */
 
+static size_t *pressure_equation_of(const struct section_solver *solver, size_t triangle, size_t corner) {
+    const struct section_mesh *mesh = solver->mesh;
+    return &solver->pressure_equation[mesh->triangle[triangle][corner] * mesh->region_count + mesh->region[triangle]];
+}
+
+double section_corner_pressure(const struct section_solver *solver, size_t triangle, size_t corner) {
+    return solver->unknown[*pressure_equation_of(solver, triangle, corner)];
+}
+
 static void number_equations(struct section_solver *solver) {
     const struct section_mesh *mesh = solver->mesh;
     size_t next = 0;
-    for (size_t i = 0; i < mesh->node_count; i++) {
+    for (size_t i = 0; i < mesh->node_count * mesh->region_count; i++) {
         solver->pressure_equation[i] = NO_EQUATION;
+    }
+    for (size_t i = 0; i < mesh->node_count; i++) {
         for (size_t d = 0; d < 2; d++) {
             solver->displacement_equation[2 * i + d] = i == mesh->centre_node ? NO_EQUATION : next++;
         }
     }
     for (size_t t = 0; t < mesh->triangle_count; t++) {
         for (size_t c = 0; c < ELEMENT_CORNERS; c++) {
-            size_t *equation = &solver->pressure_equation[mesh->triangle[t][c]];
+            size_t *equation = pressure_equation_of(solver, t, c);
             if (*equation == NO_EQUATION) {
                 *equation = next++;
                 solver->pressure_count++;
@@ -61,14 +72,18 @@ static void number_equations(struct section_solver *solver) {
     solver->sparse_count = next;
 }
 
-static void local_equations(const struct section_solver *solver, const size_t *nodes, size_t node_count,
-                            size_t corner_count, size_t *equation) {
+static void displacement_equations(const struct section_solver *solver, const size_t *nodes, size_t node_count,
+                                   size_t *equation) {
     for (size_t a = 0; a < node_count; a++) {
         equation[2 * a] = solver->displacement_equation[2 * nodes[a]];
         equation[2 * a + 1] = solver->displacement_equation[2 * nodes[a] + 1];
     }
-    for (size_t c = 0; c < corner_count; c++) {
-        equation[2 * node_count + c] = solver->pressure_equation[nodes[c]];
+}
+
+static void triangle_equations(const struct section_solver *solver, size_t triangle, size_t equation[ELEMENT_LOCAL]) {
+    displacement_equations(solver, solver->mesh->triangle[triangle], ELEMENT_NODES, equation);
+    for (size_t c = 0; c < ELEMENT_CORNERS; c++) {
+        equation[ELEMENT_DISPLACEMENTS + c] = *pressure_equation_of(solver, triangle, c);
     }
 }
 
@@ -84,7 +99,7 @@ static bool make_pattern(struct section_solver *solver) {
     double *value = triplet->x;
     for (size_t t = 0; t < mesh->triangle_count; t++) {
         size_t equation[ELEMENT_LOCAL];
-        local_equations(solver, mesh->triangle[t], ELEMENT_NODES, ELEMENT_CORNERS, equation);
+        triangle_equations(solver, t, equation);
         for (size_t k = 0; k < ELEMENT_LOCAL; k++) {
             for (size_t l = 0; l <= k; l++) {
                 if (equation[k] != NO_EQUATION && equation[l] != NO_EQUATION) {
@@ -122,7 +137,7 @@ static void make_slots(struct section_solver *solver) {
     const struct section_mesh *mesh = solver->mesh;
     for (size_t t = 0; t < mesh->triangle_count; t++) {
         size_t equation[ELEMENT_LOCAL];
-        local_equations(solver, mesh->triangle[t], ELEMENT_NODES, ELEMENT_CORNERS, equation);
+        triangle_equations(solver, t, equation);
         for (size_t k = 0; k < ELEMENT_LOCAL; k++) {
             for (size_t l = 0; l <= k; l++) {
                 solver->triangle_slot[(t * ELEMENT_LOCAL + k) * ELEMENT_LOCAL + l] =
@@ -132,7 +147,7 @@ static void make_slots(struct section_solver *solver) {
     }
     for (size_t e = 0; e < mesh->edge_count; e++) {
         size_t equation[EDGE_LOCAL];
-        local_equations(solver, mesh->edge[e].node, EDGE_NODES, 0, equation);
+        displacement_equations(solver, mesh->edge[e].node, EDGE_NODES, equation);
         for (size_t k = 0; k < EDGE_LOCAL; k++) {
             for (size_t l = 0; l <= k; l++) {
                 solver->edge_slot[(e * EDGE_LOCAL + k) * EDGE_LOCAL + l] =
@@ -155,13 +170,16 @@ static bool measure_rest(struct section_solver *solver) {
             return false;
         }
         size_t equation[ELEMENT_LOCAL];
-        local_equations(solver, mesh->triangle[t], ELEMENT_NODES, ELEMENT_CORNERS, equation);
+        triangle_equations(solver, t, equation);
         for (size_t g = 0; g < ELEMENT_GAUSS_POINTS; g++) {
             double x[2] = {0.0, 0.0};
             for (size_t a = 0; a < ELEMENT_NODES; a++) {
                 x[0] += element_gauss_shape[g][a] * position[a][0];
                 x[1] += element_gauss_shape[g][a] * position[a][1];
             }
+            const double radius = hypot(x[0], x[1]);
+            solver->gauss[t][g].hoop[0] = -x[1] / radius;
+            solver->gauss[t][g].hoop[1] = x[0] / radius;
             for (size_t a = 0; a < ELEMENT_NODES; a++) {
                 if (equation[2 * a] != NO_EQUATION) {
                     const double share = solver->gauss[t][g].weight * element_gauss_shape[g][a];
@@ -179,11 +197,11 @@ static bool measure_rest(struct section_solver *solver) {
         for (size_t a = 0; a < EDGE_NODES; a++) {
             memcpy(position[a], &solver->rest[2 * n[a]], sizeof position[a]);
         }
-        if (mesh->edge[e].chamber != SECTION_OUTLINE) {
+        if (mesh->edge[e].chamber >= 0) {
             struct edge_matrix matrix;
             edge_assemble(position, &none, &matrix);
             solver->chamber_area[mesh->edge[e].chamber] += matrix.volume;
-        } else if (position[0][0] > rightmost && solver->displacement_equation[2 * n[0]] != NO_EQUATION) {
+        } else if (mesh->edge[e].chamber == SECTION_OUTLINE && position[0][0] > rightmost && solver->displacement_equation[2 * n[0]] != NO_EQUATION) {
             rightmost = position[0][0];
             solver->stabiliser = solver->displacement_equation[2 * n[0] + 1];
         }
@@ -194,7 +212,7 @@ static bool measure_rest(struct section_solver *solver) {
 static bool allocate(struct section_solver *solver) {
     const size_t nodes = solver->mesh->node_count, triangles = solver->mesh->triangle_count;
     solver->displacement_equation = calloc(2 * nodes, sizeof(size_t));
-    solver->pressure_equation = calloc(nodes, sizeof(size_t));
+    solver->pressure_equation = calloc(nodes * solver->mesh->region_count, sizeof(size_t));
     solver->rest = calloc(2 * nodes, sizeof(double));
     solver->gauss = calloc(triangles, sizeof *solver->gauss);
     solver->triangle_slot = calloc(triangles * ELEMENT_LOCAL * ELEMENT_LOCAL, sizeof(size_t));
@@ -233,9 +251,16 @@ struct section_solver *section_solver_create(const struct section_mesh *mesh, co
     }
     start_sparse(solver);
     solver->mesh = mesh;
-    solver->material = module->material;
     solver->modulus_pa = material_shear_modulus(&module->material);
-    solver->bulk = module->material.bulk_modulus_pa / solver->modulus_pa;
+    solver->law[0] = (struct element_law){.material = module->material,
+                                          .bulk = module->material.bulk_modulus_pa / solver->modulus_pa};
+    for (size_t l = 0; l < module->layer_count; l++) {
+        const struct module_layer *layer = &module->layer[l];
+        solver->law[l + 1] = (struct element_law){.material = layer->material,
+                                                  .bulk = layer->material.bulk_modulus_pa / solver->modulus_pa,
+                                                  .corrugation_fraction = layer->corrugation_fraction,
+                                                  .corrugation = layer->corrugation};
+    }
     solver->radius_m = mesh->outer_radius_m;
     if (!allocate(solver) || !make_pattern(solver)) {
         set_error(error, "out of memory for a section of %zu triangles", mesh->triangle_count);
@@ -329,7 +354,7 @@ double section_solver_chamber_area_m2(const struct section_solver *solver, size_
 static void scatter_triangle(struct section_solver *solver, size_t triangle, const struct element_matrix *matrix) {
     size_t equation[ELEMENT_LOCAL];
     double *value = solver->matrix->x;
-    local_equations(solver, solver->mesh->triangle[triangle], ELEMENT_NODES, ELEMENT_CORNERS, equation);
+    triangle_equations(solver, triangle, equation);
     for (size_t k = 0; k < ELEMENT_LOCAL; k++) {
         if (equation[k] == NO_EQUATION) {
             continue;
@@ -359,7 +384,7 @@ static void scatter_edge(struct section_solver *solver, size_t edge, const doubl
     const double pressure = solver->pressure[chamber];
     size_t equation[EDGE_LOCAL];
     double *value = solver->matrix->x;
-    local_equations(solver, solver->mesh->edge[edge].node, EDGE_NODES, 0, equation);
+    displacement_equations(solver, solver->mesh->edge[edge].node, EDGE_NODES, equation);
     solver->volume[chamber] += matrix->volume;
     for (size_t k = 0; k < EDGE_LOCAL; k++) {
         if (equation[k] == NO_EQUATION) {
@@ -380,6 +405,30 @@ static void scatter_edge(struct section_solver *solver, size_t edge, const doubl
     for (size_t m = 0; m < GLOBALS; m++) {
         solver->residual[solver->sparse_count + m] -= pressure * matrix->global_gradient[m];
         solver->load[solver->sparse_count + m] += direction[chamber] * matrix->global_gradient[m];
+    }
+}
+
+static void scatter_fibres(struct section_solver *solver, size_t edge, double position[EDGE_NODES][2]) {
+    const struct section_edge *at = &solver->mesh->edge[edge];
+    const double stiffness = at->hoop_stiffness_npm / (solver->modulus_pa * solver->radius_m);
+    struct fibre_matrix matrix;
+    size_t equation[EDGE_LOCAL];
+    double rest[EDGE_NODES][2], *value = solver->matrix->x;
+    for (size_t a = 0; a < EDGE_NODES; a++) {
+        memcpy(rest[a], &solver->rest[2 * at->node[a]], sizeof rest[a]);
+    }
+    fibre_assemble(rest, position, stiffness, &matrix);
+    displacement_equations(solver, at->node, EDGE_NODES, equation);
+    for (size_t k = 0; k < EDGE_LOCAL; k++) {
+        const size_t *slot = &solver->edge_slot[(edge * EDGE_LOCAL + k) * EDGE_LOCAL];
+        if (equation[k] != NO_EQUATION) {
+            solver->residual[equation[k]] += matrix.gradient[k];
+        }
+        for (size_t l = 0; l <= k; l++) {
+            if (slot[l] != NO_EQUATION) {
+                value[slot[l]] += matrix.hessian[k][l];
+            }
+        }
     }
 }
 
@@ -406,16 +455,16 @@ static bool assemble(struct section_solver *solver, const double direction[MODUL
         struct element_matrix matrix;
         section_deformed_triangle(solver, t, position);
         for (size_t c = 0; c < ELEMENT_CORNERS; c++) {
-            pressure[c] = solver->unknown[solver->pressure_equation[mesh->triangle[t][c]]];
+            pressure[c] = section_corner_pressure(solver, t, c);
         }
-        if (!element_assemble(solver->gauss[t], position, pressure, &globals, &solver->material, solver->modulus_pa,
-                              solver->bulk, &matrix)) {
+        if (!element_assemble(solver->gauss[t], position, pressure, &globals, &solver->law[mesh->region[t]],
+                              solver->modulus_pa, &matrix)) {
             return false;
         }
         scatter_triangle(solver, t, &matrix);
     }
     for (size_t e = 0; e < mesh->edge_count; e++) {
-        if (mesh->edge[e].chamber == SECTION_OUTLINE) {
+        if (mesh->edge[e].chamber < 0) {
             continue;
         }
         double position[EDGE_NODES][2];
@@ -429,6 +478,9 @@ static bool assemble(struct section_solver *solver, const double direction[MODUL
         struct edge_matrix matrix;
         edge_assemble(position, &globals, &matrix);
         scatter_edge(solver, e, direction, &matrix);
+        if (mesh->edge[e].hoop_stiffness_npm > 0.0) {
+            scatter_fibres(solver, e, position);
+        }
     }
     const double multiplier = solver->unknown[solver->sparse_count + GLOBALS];
     for (size_t i = 0; i < solver->sparse_count; i++) {

@@ -34,13 +34,16 @@ struct section_state {
     double von_mises_apex_pa;    /* mean through the wall at the apex of the chamber with the highest pressure */
     double stretch_max;          /* greatest principal stretch */
     bool stable;
-    bool beyond_strain;          /* stretch over the material's fitted range */
-    bool contact;                /* walls of a cavity cross or touch */
+    bool beyond_strain;          /* stretch over the fitted range of the material there */
+    bool elliptic;               /* the law is, at every Gauss point (material_ellipticity_margin) */
+    bool contact;                /* walls of a cavity, of the bore or of the outside cross or touch */
     int newton_iterations;
 };
 
 struct section_mesh *section_mesh_create(const struct module_description *module,
                                          const struct section_mesh_options *options, struct description_error *error);
+/* Are the three chambers alike and each its own mirror image? Then one sixth of a table makes the whole. */
+bool section_is_symmetric(const struct module_description *module);
 void section_mesh_free(struct section_mesh *mesh);
 
 /* Solver for one thread; the mesh may be shared. NULL with a message when memory or factorisation set-up fails. */

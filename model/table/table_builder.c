@@ -279,19 +279,6 @@ static bool make_image(const struct build *build, struct table_image *image) {
     return true;
 }
 
-/* Does a mirror at chamber 1's axis leave the section as it is? Only then does one sixth make the whole. */
-static bool has_mirror(const struct module_description *module) {
-    const struct chamber *chamber = &module->chamber[0];
-    for (size_t k = 0; k < chamber->cavity_count; k++) {
-        const struct cavity *cavity = &chamber->cavity[k];
-        if (fabs(cavity->centre_m[1]) > 1e-9 ||
-            (cavity->shape == CAVITY_SEMICIRCLE && fabs(sin(cavity->orientation_rad)) > 1e-9)) {
-            return false;
-        }
-    }
-    return module->three_fold;
-}
-
 static bool run(struct build *build, struct table_image *image, struct description_error *error) {
     const struct section_mesh_options mesh_options = {.size_m = build->options->size_m};
     struct section_mesh *mesh = section_mesh_create(build->module, &mesh_options, error);
@@ -331,7 +318,7 @@ bool table_build(const struct module_description *module, const struct table_bui
                        TABLE_NODES_LEAST, BEND_TABLE_AXIS_NODES_MAX, build.n);
         return false;
     }
-    if (!has_mirror(module)) {
+    if (!section_is_symmetric(module)) {
         (void)snprintf(error->text, sizeof error->text,
                        "module %s: tables are built for three equal chambers that are symmetric about their axis; "
                        "describe one such chamber",

@@ -13,6 +13,8 @@ static const struct material neo_hookean = {.law = MATERIAL_NEO_HOOKEAN, .terms 
                                             .bulk_modulus_pa = 1e9, .strain_max = 9.0};
 static const struct material quadratic = {.law = MATERIAL_REDUCED_POLYNOMIAL, .terms = 2,
                                           .coefficient_pa = {6000.0, 200.0}, .bulk_modulus_pa = 1e9, .strain_max = 9.0};
+static const struct material ogden = {.law = MATERIAL_OGDEN, .terms = 2, .coefficient_pa = {15000.0, 25.0},
+                                      .exponent = {2.2, 5.8}, .bulk_modulus_pa = 1e9, .strain_max = 9.0};
 static const struct material yeoh = {.law = MATERIAL_YEOH, .terms = 3, .coefficient_pa = {5072.0, 331.0, 15.0},
                                      .bulk_modulus_pa = 1e9, .strain_max = 9.0};
 
@@ -68,15 +70,9 @@ static double next_random(uint64_t *random) {
 
 /* --- the tangent is the derivative of the residual --- */
 
-static void check_tangent(const struct material *material) {
-    struct fixture fixture;
-    set_up_module(&fixture, "tables/modules/paper-circle.yaml", 1.5e-3);
-    section_solver_free(fixture.solver);
-    struct description_error error;
-    fixture.module.material = *material;
-    fixture.solver = section_solver_create(fixture.mesh, &fixture.module, &error);
-    struct section_solver *solver = fixture.solver;
-    (void)state_at(solver, 4000.0, 1500.0, 500.0);
+static void check_tangent_of(struct fixture *fixture, const double pressure_pa[3]) {
+    struct section_solver *solver = fixture->solver;
+    (void)state_at(solver, pressure_pa[0], pressure_pa[1], pressure_pa[2]);
     const size_t n = section_solver_equations(solver);
     double *direction = calloc(n, sizeof(double)), *product = calloc(n, sizeof(double));
     double *plus = calloc(n, sizeof(double)), *minus = calloc(n, sizeof(double));
@@ -102,7 +98,35 @@ static void check_tangent(const struct material *material) {
     free(product);
     free(plus);
     free(minus);
-    tear_down(&fixture);
+    tear_down(fixture);
+}
+
+static void check_tangent(const struct material *material) {
+    const double pressure_pa[3] = {4000.0, 1500.0, 500.0};
+    struct fixture fixture;
+    set_up_module(&fixture, "tables/modules/paper-circle.yaml", 1.5e-3);
+    section_solver_free(fixture.solver);
+    struct description_error error;
+    fixture.module.material = *material;
+    fixture.solver = section_solver_create(fixture.mesh, &fixture.module, &error);
+    check_tangent_of(&fixture, pressure_pa);
+}
+
+/* A bore, pairs of cavities, fibres; layers of other rubbers, one corrugated. */
+static void tangent_with_fibres_and_a_bore(void **state) {
+    (void)state;
+    const double pressure_pa[3] = {60000.0, 20000.0, 5000.0};
+    struct fixture fixture;
+    set_up_module(&fixture, "tables/modules/stiff-flop.yaml", 1.5e-3);
+    check_tangent_of(&fixture, pressure_pa);
+}
+
+static void tangent_with_a_corrugated_layer(void **state) {
+    (void)state;
+    const double pressure_pa[3] = {9000.0, 3000.0, 1000.0};
+    struct fixture fixture;
+    set_up_module(&fixture, "tables/modules/paper-composite.yaml", 1.5e-3);
+    check_tangent_of(&fixture, pressure_pa);
 }
 
 static void tangent_of_neo_hooke(void **state) {
@@ -113,6 +137,11 @@ static void tangent_of_neo_hooke(void **state) {
 static void tangent_of_a_reduced_polynomial(void **state) {
     (void)state;
     check_tangent(&quadratic);
+}
+
+static void tangent_of_ogden(void **state) {
+    (void)state;
+    check_tangent(&ogden);
 }
 
 static void tangent_of_yeoh(void **state) {
@@ -126,13 +155,18 @@ struct tube {
     const struct material *material;
     double inner_m; /* undeformed */
     double outer_m;
+    double fibre_npm;                   /* wound round the inner wall */
+    double corrugation_fraction;        /* of the whole wall */
+    const struct material *corrugation;
 };
 
 /* Pressure that holds inner radius `a` at axial stretch `z`, and the axial force that is left over. */
 static double tube_pressure(const struct tube *tube, double a, double z, double *axial) {
     enum { PARTS = 2000 };
     const double b = sqrt(a * a + (tube->outer_m * tube->outer_m - tube->inner_m * tube->inner_m) / z);
-    double pressure = 0.0, sum = 0.0;
+    const double hold = a / tube->inner_m > 1.0 ? tube->fibre_npm * (a / tube->inner_m - 1.0) / (a * z) : 0.0;
+    const double share = 1.0 - tube->corrugation_fraction;
+    double pressure = 0.0, sum = 0.0; /* what the rubber bears */
     for (int pass = 0; pass < 2; pass++) { /* the pressure first, then the axial stress with it */
         double radial = -pressure;
         sum = 0.0;
@@ -143,16 +177,21 @@ static double tube_pressure(const struct tube *tube, double a, double z, double 
             const double stretch[3] = {hoop, through, z};
             double by[3], ignored[3][3];
             material_principal(tube->material, stretch, by, ignored);
-            const double slope = (hoop * by[0] - through * by[1]) / r;
-            sum += (radial + 0.5 * dr * slope + z * by[2] - through * by[1]) * 2.0 * M_PI * r * dr;
+            double rings = 0.0, unused;
+            if (tube->corrugation != NULL) {
+                material_uniaxial(tube->corrugation, hoop, &rings, &unused);
+            }
+            const double slope =
+                (share * (hoop * by[0] - through * by[1]) + tube->corrugation_fraction * rings * hoop) / r;
+            sum += (radial + 0.5 * dr * slope + share * (z * by[2] - through * by[1])) * 2.0 * M_PI * r * dr;
             radial += dr * slope;
         }
         if (pass == 0) {
             pressure = radial + pressure; /* zero outside */
         }
     }
-    *axial = sum - pressure * M_PI * a * a;
-    return pressure;
+    *axial = sum - (pressure + hold) * M_PI * a * a;
+    return pressure + hold;
 }
 
 static double tube_stretch(const struct tube *tube, double a) {
@@ -165,20 +204,41 @@ static double tube_stretch(const struct tube *tube, double a) {
     return 0.5 * (low + high);
 }
 
-static void check_tube(const struct material *material, double most_pa) {
+static void set_up_tube(struct fixture *fixture, const struct tube *tube) {
+    struct description_error error;
+    const struct cavity hole = {.shape = CAVITY_CIRCLE, .radius_m = tube->inner_m, .hoop_stiffness_npm = tube->fibre_npm};
+    const int chamber = 0;
+    memset(fixture, 0, sizeof *fixture);
+    fixture->module.material = *tube->material;
+    fixture->mesh = section_mesh_create_disc(tube->outer_m, &hole, &chamber, 1, 0.5e-3, &error);
+    assert_non_null(fixture->mesh);
+    if (tube->corrugation != NULL) { /* the whole wall is one layer */
+        fixture->module.layer_count = 1;
+        fixture->module.layer[0] = (struct module_layer){.material = *tube->material,
+                                                         .corrugation_fraction = tube->corrugation_fraction,
+                                                         .corrugation = *tube->corrugation};
+        fixture->mesh->region_count = 2;
+        for (size_t t = 0; t < fixture->mesh->triangle_count; t++) {
+            fixture->mesh->region[t] = 1;
+        }
+    }
+    fixture->solver = section_solver_create(fixture->mesh, &fixture->module, &error);
+    assert_non_null(fixture->solver);
+}
+
+static void check_tube(const struct tube *tube, double most_pa) {
     struct fixture fixture;
-    const struct tube tube = {.material = material, .inner_m = 0.005, .outer_m = 0.01};
-    set_up_disc(&fixture, material, tube.inner_m, 0.0);
+    set_up_tube(&fixture, tube);
     for (int step = 1; step <= 4; step++) {
         const struct section_state state = state_at(fixture.solver, most_pa * step / 4.0, 0.0, 0.0);
-        double low = tube.inner_m, high = 4.0 * tube.inner_m, axial = 0.0;
+        double low = tube->inner_m, high = 4.0 * tube->inner_m, axial = 0.0;
         for (int i = 0; i < 60; i++) { /* the tube of the same inner volume */
             const double a = 0.5 * (low + high);
-            *(tube_stretch(&tube, a) * M_PI * a * a < state.volume_m2[0] ? &low : &high) = a;
+            *(tube_stretch(tube, a) * M_PI * a * a < state.volume_m2[0] ? &low : &high) = a;
         }
-        const double stretch = tube_stretch(&tube, low), pressure = tube_pressure(&tube, low, stretch, &axial);
+        const double stretch = tube_stretch(tube, low), pressure = tube_pressure(tube, low, stretch, &axial);
         print_message("           volume x %.2f: pressure %.2f Pa, closed form %.2f; stretch %.5f, %.5f\n",
-                      state.volume_m2[0] / (M_PI * tube.inner_m * tube.inner_m), state.pressure_pa[0], pressure,
+                      state.volume_m2[0] / (M_PI * tube->inner_m * tube->inner_m), state.pressure_pa[0], pressure,
                       state.stretch, stretch);
         assert_relative(state.pressure_pa[0], pressure, 1e-3);
         assert_relative(state.stretch, stretch, 1e-3);
@@ -191,12 +251,33 @@ static void check_tube(const struct material *material, double most_pa) {
 
 static void closed_thick_tube_of_neo_hooke(void **state) {
     (void)state;
-    check_tube(&neo_hookean, 8000.0);
+    const struct tube tube = {.material = &neo_hookean, .inner_m = 0.005, .outer_m = 0.01};
+    check_tube(&tube, 8000.0);
 }
 
 static void closed_thick_tube_of_yeoh(void **state) {
     (void)state;
-    check_tube(&yeoh, 8000.0);
+    const struct tube tube = {.material = &yeoh, .inner_m = 0.005, .outer_m = 0.01};
+    check_tube(&tube, 8000.0);
+}
+
+static void closed_thick_tube_of_ogden(void **state) {
+    (void)state;
+    const struct tube tube = {.material = &ogden, .inner_m = 0.005, .outer_m = 0.01};
+    check_tube(&tube, 6400.0);
+}
+
+static void closed_thick_tube_with_hoop_fibres(void **state) {
+    (void)state;
+    const struct tube tube = {.material = &yeoh, .inner_m = 0.005, .outer_m = 0.01, .fibre_npm = 200.0};
+    check_tube(&tube, 16000.0);
+}
+
+static void closed_thick_tube_with_corrugated_wall(void **state) {
+    (void)state;
+    const struct tube tube = {.material = &yeoh, .inner_m = 0.005, .outer_m = 0.01, .corrugation_fraction = 0.3,
+                              .corrugation = &neo_hookean};
+    check_tube(&tube, 6000.0);
 }
 
 /* --- pure bending: the exact field of an incompressible bar, sigma_33 = E kappa y alone (Timoshenko and Goodier) --- */
@@ -427,8 +508,14 @@ int main(void) {
         cmocka_unit_test(tangent_of_neo_hooke),
         cmocka_unit_test(tangent_of_a_reduced_polynomial),
         cmocka_unit_test(tangent_of_yeoh),
+        cmocka_unit_test(tangent_of_ogden),
+        cmocka_unit_test(tangent_with_fibres_and_a_bore),
+        cmocka_unit_test(tangent_with_a_corrugated_layer),
         cmocka_unit_test(closed_thick_tube_of_neo_hooke),
         cmocka_unit_test(closed_thick_tube_of_yeoh),
+        cmocka_unit_test(closed_thick_tube_of_ogden),
+        cmocka_unit_test(closed_thick_tube_with_hoop_fibres),
+        cmocka_unit_test(closed_thick_tube_with_corrugated_wall),
         cmocka_unit_test(stiffness_of_pure_bending_is_youngs_modulus_times_inertia),
         cmocka_unit_test(pressures_and_width_of_the_circle),
         cmocka_unit_test(pressures_and_width_of_the_semicircle),
