@@ -3,6 +3,7 @@
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
+#include <sys/resource.h>
 #include <time.h>
 #include <unistd.h>
 
@@ -17,6 +18,7 @@ struct arguments {
     const char *output;
     struct table_build_options build;
     bool quiet;
+    bool resume;
 };
 
 static const struct argp_option options[] = {
@@ -24,6 +26,7 @@ static const struct argp_option options[] = {
     {"material", 'm', "NAME", 0, "a material from tables/materials, or the path of a YAML file", 0},
     {"nodes", 'n', "COUNT", 0, "nodes on each pressure axis, 4 to 32 (default 17)", 0},
     {"mesh-size", 's', "LENGTH", 0, "element size at chamber walls (default 0.75mm)", 0},
+    {"resume", 'r', NULL, 0, "keep finished slabs in FILE.points, and go on from those that are there", 0},
     {"quiet", 'q', NULL, 0, "no progress", 0},
     {0}};
 
@@ -49,6 +52,9 @@ static error_t parse(int key, char *argument, struct argp_state *state) {
     case 'q':
         arguments->quiet = true;
         return 0;
+    case 'r':
+        arguments->resume = true;
+        return 0;
     case ARGP_KEY_ARG:
         if (state->arg_num > 0) {
             argp_error(state, "one module at a time, '%s' is too much", argument);
@@ -64,7 +70,8 @@ static error_t parse(int key, char *argument, struct argp_state *state) {
 }
 
 static const struct argp parser = {options, parse, "MODULE",
-                                   "Build the bend table of MODULE (a name from tables/modules or a YAML file).",
+                                   "Build the bend table of MODULE (a name from tables/modules or a YAML file), on "
+                                   "every core of this machine, or with mpirun -n RANKS on many machines.",
                                    NULL, NULL, NULL};
 
 /* A bar that redraws itself on a terminal, a line for each tenth elsewhere. */
@@ -88,32 +95,51 @@ static double seconds(void) {
     return (double)now.tv_sec + 1e-9 * (double)now.tv_nsec;
 }
 
-static int run(struct arguments *arguments) {
+static double peak_memory_mib(void) {
+    struct rusage usage;
+    return getrusage(RUSAGE_SELF, &usage) == 0 ? (double)usage.ru_maxrss / 1024.0 : 0.0;
+}
+
+static int run(struct arguments *arguments, bool first_rank) {
     char path[PROGRAM_PATH_BYTES], message[PROGRAM_ERROR_BYTES], output[PROGRAM_PATH_BYTES];
+    char keep[PROGRAM_PATH_BYTES + 8];
     struct module_description module;
     struct description_error error;
     struct table_image image;
     bool terminal = isatty(STDERR_FILENO) != 0;
     cli_table_path("modules", arguments->module, path);
     if (!module_description_read(path, arguments->material, &module, &error)) {
-        return program_fail(EXIT_BAD_INPUT, "%s", error.text);
+        return first_rank ? program_fail(EXIT_BAD_INPUT, "%s", error.text) : EXIT_BAD_INPUT;
     }
     (void)snprintf(output, sizeof output, "%s%s", arguments->output != NULL ? arguments->output : module.name,
                    arguments->output != NULL ? "" : ".tbt");
-    cli_print_material(&module.material);
-    (void)fflush(stdout);
+    (void)snprintf(keep, sizeof keep, "%s.points", output);
+    if (first_rank) {
+        cli_print_material(&module.material);
+        (void)fflush(stdout);
+    }
     program_catch_interrupt();
     arguments->build.stop = &program_interrupted;
-    arguments->build.progress = arguments->quiet ? NULL : show_progress;
+    arguments->build.progress = arguments->quiet || !first_rank ? NULL : show_progress;
     arguments->build.context = &terminal;
+    arguments->build.keep_path = arguments->resume ? keep : NULL;
     const double start_s = seconds();
-    if (!table_build(&module, &arguments->build, &image, &error)) {
-        return program_fail(program_interrupted != 0 ? EXIT_INTERRUPTED : EXIT_SOLVER, "%s%s", terminal ? "\n" : "", error.text);
+    const enum sweep_outcome outcome = table_build(&module, &arguments->build, &image, &error);
+    if (outcome == SWEEP_HELPED) {
+        return EXIT_OK;
+    }
+    if (outcome != SWEEP_DONE) {
+        return program_fail(outcome == SWEEP_STOPPED ? EXIT_INTERRUPTED : EXIT_SOLVER, "%s%s", terminal ? "\n" : "",
+                            error.text);
     }
     const bool written = table_image_write(&image, output, message, sizeof message);
     if (written) {
-        printf("table     %s: %zu nodes from %zu equilibria (%zu without), %zu bytes, %.1f s\n", output, image.nodes,
-               image.solved, image.no_equilibrium, image.size, seconds() - start_s);
+        printf("table     %s: %zu nodes from %zu equilibria (%zu without), %zu bytes, %.1f s, peak memory %.0f MiB", output,
+               image.nodes, image.solved, image.no_equilibrium, image.size, seconds() - start_s, peak_memory_mib());
+        if (sweep_ranks() > 1) {
+            printf(" on %zu ranks", sweep_ranks());
+        }
+        putchar('\n');
     }
     table_image_free(&image);
     return written ? EXIT_OK : program_fail(EXIT_OUTPUT, "%s", message);
@@ -125,5 +151,8 @@ int cli_build(int argc, char **argv) {
     if (argp_parse(&parser, argc, argv, 0, NULL, &arguments) != 0) {
         return EXIT_USAGE;
     }
-    return run(&arguments);
+    const bool first_rank = sweep_join();
+    const int code = run(&arguments, first_rank);
+    sweep_leave();
+    return code;
 }

@@ -11,6 +11,7 @@
 #include "control/bend_table_format.h"
 #include "program/output_file.h"
 #include "section/section_solver.h"
+#include "sweep/sweep.h"
 
 _Static_assert(__BYTE_ORDER__ == __ORDER_LITTLE_ENDIAN__, "the image is written in the host's byte order");
 
@@ -27,25 +28,50 @@ struct node {
 struct build {
     const struct module_description *module;
     const struct table_build_options *options;
+    const struct section_mesh *mesh;
     size_t n;
     double axis_pa[BEND_TABLE_AXIS_NODES_MAX];
     struct node *node; /* [n * n * n], filled where i1 >= i2 >= i3 */
     double *base;      /* [n * unknowns] states with chamber 1 alone */
     size_t base_count; /* of them with an equilibrium */
     size_t unknowns;
-    size_t done;
     size_t total;
-    size_t newton_iterations;
-    size_t no_equilibrium;
-    bool failed;
+    size_t done;       /* for the progress */
+};
+
+/* A slab of the table, chamber 1 at node i: this head, then the nodes (j, k) with i >= j >= k, row by row. */
+struct slab_head {
+    uint64_t solved;
+    uint64_t no_equilibrium;
+    uint64_t newton_iterations;
+};
+
+/* One worker of the sweep. */
+struct worker {
+    struct section_solver *solver;
+    double *row;
 };
 
 static struct node *node_at(const struct build *build, size_t i, size_t j, size_t k) {
     return &build->node[k + build->n * (j + build->n * i)];
 }
 
+static size_t slab_nodes(size_t i) {
+    return (i + 1) * (i + 2) / 2;
+}
+
 static bool stopped(const struct build *build) {
     return build->options->stop != NULL && *build->options->stop != 0;
+}
+
+static void tick(struct build *build, size_t count) {
+#pragma omp critical(table_progress)
+    {
+        build->done += count;
+        if (build->options->progress != NULL) {
+            build->options->progress(build->options->context, build->done, build->total);
+        }
+    }
 }
 
 static void record(struct node *node, const struct section_state *state) {
@@ -64,31 +90,27 @@ static void record(struct node *node, const struct section_state *state) {
 }
 
 /* Move to a node and record it; false where there is no equilibrium. */
-static bool solve_node(struct build *build, struct section_solver *solver, size_t i, size_t j, size_t k) {
-    const double pressure_pa[3] = {build->axis_pa[i], build->axis_pa[j], build->axis_pa[k]};
+static bool solve_node(struct build *build, struct section_solver *solver, const double pressure_pa[3],
+                       struct node *node, struct slab_head *head) {
     struct section_state state;
     const bool found = section_solver_move_to(solver, pressure_pa);
     section_solver_state(solver, &state);
     if (found) {
-        record(node_at(build, i, j, k), &state);
+        record(node, &state);
     }
-#pragma omp critical(table_progress)
-    {
-        build->done++;
-        build->newton_iterations += (size_t)state.newton_iterations;
-        build->no_equilibrium += !found;
-        if (build->options->progress != NULL) {
-            build->options->progress(build->options->context, build->done, build->total);
-        }
-    }
+    head->solved++;
+    head->no_equilibrium += !found;
+    head->newton_iterations += (uint64_t)state.newton_iterations;
+    tick(build, 1);
     return found;
 }
 
-/* Chamber 1 alone, from nothing to the end of the axis: where each slab starts. */
+/* Chamber 1 alone, from nothing to the end of the axis: where each slab starts. Every worker would find the same. */
 static void solve_base(struct build *build, struct section_solver *solver) {
     section_solver_reset(solver);
     for (size_t i = 0; i < build->n && !stopped(build); i++) {
-        if (!solve_node(build, solver, i, 0, 0)) {
+        const double pressure_pa[3] = {build->axis_pa[i], 0.0, 0.0};
+        if (!section_solver_move_to(solver, pressure_pa)) {
             return;
         }
         section_solver_save(solver, build->base + i * build->unknowns);
@@ -96,57 +118,95 @@ static void solve_base(struct build *build, struct section_solver *solver) {
     }
 }
 
-/* One slab: chamber 1 fixed, chamber 2 rising, and from each of its states chamber 3 rising up to chamber 2. */
-static void solve_slab(struct build *build, struct section_solver *solver, double *row, size_t i) {
-    memcpy(row, build->base + i * build->unknowns, build->unknowns * sizeof(double));
-    for (size_t j = 1; j <= i; j++) {
-        section_solver_restore(solver, row);
-        if (stopped(build) || !solve_node(build, solver, i, j, 0)) {
-            return;
-        }
-        section_solver_save(solver, row);
-        for (size_t k = 1; k <= j && !stopped(build); k++) {
-            if (!solve_node(build, solver, i, j, k)) {
-                break;
-            }
-        }
-    }
+static void close_worker(void *pointer) {
+    struct worker *worker = pointer;
+    section_solver_free(worker->solver);
+    free(worker->row);
+    free(worker);
 }
 
-static void solve_all(struct build *build, const struct section_mesh *mesh, struct description_error *error) {
-#pragma omp parallel
-    {
-        struct description_error own = {""};
-        struct section_solver *solver = section_solver_create(mesh, build->module, &own);
-        double *row = NULL;
-#pragma omp single
+static void *open_worker(void *context, char *error, size_t error_bytes) {
+    struct build *build = context;
+    struct description_error why = {"out of memory for the table"};
+    struct worker *worker = calloc(1, sizeof *worker);
+    if (worker != NULL) {
+        worker->solver = section_solver_create(build->mesh, build->module, &why);
+    }
+    if (worker != NULL && worker->solver != NULL) {
+#pragma omp critical(table_base)
         {
-            if (solver != NULL) {
-                build->unknowns = section_solver_unknowns(solver);
+            if (build->base == NULL) {
+                build->unknowns = section_solver_unknowns(worker->solver);
                 build->base = malloc(build->n * build->unknowns * sizeof(double));
                 if (build->base != NULL) {
-                    solve_base(build, solver);
+                    solve_base(build, worker->solver);
                 }
             }
         }
-        row = malloc((build->unknowns + 1) * sizeof(double));
-        if (solver == NULL || row == NULL || build->base == NULL) {
-#pragma omp critical(table_failure)
-            {
-                build->failed = true;
-                (void)snprintf(error->text, sizeof error->text, "%.256s",
-                               own.text[0] == '\0' ? "out of memory for the table" : own.text);
+        worker->row = malloc(build->unknowns * sizeof(double));
+    }
+    if (worker != NULL && (worker->row == NULL || build->base == NULL)) {
+        (void)snprintf(error, error_bytes, "%.200s", why.text);
+        close_worker(worker);
+        return NULL;
+    }
+    return worker;
+}
+
+/* Task `back` is the slab i = n - 1 - back, the largest first: chamber 1 fixed, chamber 2 rising, and from each of its
+ * states chamber 3 rising up to chamber 2. */
+static bool solve_slab(void *context, void *pointer, size_t back, struct sweep_result *result) {
+    struct build *build = context;
+    struct worker *worker = pointer;
+    const size_t i = build->n - 1 - back;
+    result->size = sizeof(struct slab_head) + slab_nodes(i) * sizeof(struct node);
+    result->bytes = calloc(1, result->size);
+    if (result->bytes == NULL) {
+        return false;
+    }
+    struct slab_head head = {0, 0, 0};
+    struct node *node = (struct node *)(void *)(result->bytes + sizeof head);
+    if (i < build->base_count) {
+        memcpy(worker->row, build->base + i * build->unknowns, build->unknowns * sizeof(double));
+    }
+    for (size_t j = 0; j <= i && i < build->base_count && !stopped(build); j++) {
+        bool found = true;
+        section_solver_restore(worker->solver, worker->row);
+        for (size_t k = 0; k <= j && found && !stopped(build); k++) {
+            const double pressure_pa[3] = {build->axis_pa[i], build->axis_pa[j], build->axis_pa[k]};
+            found = solve_node(build, worker->solver, pressure_pa, &node[j * (j + 1) / 2 + k], &head);
+            if (k == 0 && found) {
+                section_solver_save(worker->solver, worker->row);
+            } else if (k == 0) {
+                j = i; /* no equilibrium with two chambers: none further out */
             }
         }
-#pragma omp barrier
-#pragma omp for schedule(dynamic, 1)
-        for (size_t back = 0; back < build->base_count; back++) {
-            if (!build->failed) { /* the largest slab first */
-                solve_slab(build, solver, row, build->base_count - 1 - back);
-            }
+    }
+    memcpy(result->bytes, &head, sizeof head);
+    if (stopped(build)) {
+        free(result->bytes);
+        *result = (struct sweep_result){NULL, 0};
+    }
+    return !stopped(build);
+}
+
+static void count_arrival(void *context, size_t back) {
+    struct build *build = context;
+    tick(build, slab_nodes(build->n - 1 - back));
+}
+
+static void take_slabs(struct build *build, const struct sweep_result *results, struct table_image *image) {
+    for (size_t back = 0; back < build->n; back++) {
+        const size_t i = build->n - 1 - back;
+        struct slab_head head;
+        memcpy(&head, results[back].bytes, sizeof head);
+        image->solved += head.solved;
+        image->no_equilibrium += head.no_equilibrium;
+        image->newton_iterations += head.newton_iterations;
+        for (size_t j = 0; j <= i; j++) {
+            memcpy(node_at(build, i, j, 0), results[back].bytes + sizeof head + j * (j + 1) / 2 * sizeof(struct node),
+                   (j + 1) * sizeof(struct node));
         }
-        free(row);
-        section_solver_free(solver);
     }
 }
 
@@ -273,42 +333,74 @@ static bool make_image(const struct build *build, struct table_image *image) {
     const size_t covered = BEND_TABLE_OFFSET_CRC + 4;
     put_u32(image->bytes, BEND_TABLE_OFFSET_CRC, crc32(0, image->bytes + covered, (uInt)(image->size - covered)));
     image->nodes = count;
-    image->solved = build->done;
-    image->no_equilibrium = build->no_equilibrium;
-    image->newton_iterations = build->newton_iterations;
     return true;
 }
 
-static bool run(struct build *build, struct table_image *image, struct description_error *error) {
-    const struct section_mesh_options mesh_options = {.size_m = build->options->size_m};
-    struct section_mesh *mesh = section_mesh_create(build->module, &mesh_options, error);
-    if (mesh == NULL) {
-        return false;
+/* The first slab without an equilibrium of chamber 1 alone. */
+static size_t first_empty_slab(const struct build *build) {
+    size_t i = 0;
+    while (i < build->n && node_at(build, i, 0, 0)->tag != 0) {
+        i++;
     }
-    solve_all(build, mesh, error);
-    section_mesh_free(mesh);
-    if (build->failed) {
-        return false;
+    return i;
+}
+
+static enum sweep_outcome finish(struct build *build, enum sweep_outcome outcome, const struct sweep_result *results,
+                                 struct table_image *image, struct description_error *error) {
+    if (outcome == SWEEP_STOPPED) {
+        (void)snprintf(error->text, sizeof error->text, "interrupted after %zu of %zu equilibria; %s", build->done,
+                       build->total,
+                       build->options->keep_path == NULL ? "nothing was written"
+                                                         : "the finished slabs are kept: the same command goes on");
     }
-    if (stopped(build)) {
-        (void)snprintf(error->text, sizeof error->text, "interrupted after %zu of %zu equilibria; nothing was written",
-                       build->done, build->total);
-        return false;
+    if (outcome != SWEEP_DONE) {
+        return outcome;
     }
-    if (build->base_count < 3) {
+    take_slabs(build, results, image);
+    const size_t reached = first_empty_slab(build);
+    if (reached < 3) {
         (void)snprintf(error->text, sizeof error->text,
-                       "material %s has no stable equilibrium above %.0f Pa: no table can be made of it",
-                       build->module->material.name, build->axis_pa[build->base_count == 0 ? 0 : build->base_count - 1]);
-        return false;
+                       "material %s has no stable equilibrium above %.0f Pa: no table can be made of it; see "
+                       "`tribend-tables material %s`",
+                       build->module->material.name, build->axis_pa[reached == 0 ? 0 : reached - 1],
+                       build->module->material.name);
+        return SWEEP_FAILED;
     }
     if (!make_image(build, image)) {
         (void)snprintf(error->text, sizeof error->text, "out of memory for the table's image");
-        return false;
+        return SWEEP_FAILED;
     }
-    return true;
+    return SWEEP_DONE;
 }
 
-bool table_build(const struct module_description *module, const struct table_build_options *options,
+static enum sweep_outcome run(struct build *build, struct table_image *image, struct description_error *error) {
+    const struct section_mesh_options mesh_options = {.size_m = build->options->size_m};
+    struct section_mesh *mesh = section_mesh_create(build->module, &mesh_options, error);
+    struct sweep_result *results = calloc(build->n, sizeof *results);
+    enum sweep_outcome outcome = SWEEP_FAILED;
+    if (mesh != NULL && results != NULL) {
+        const struct sweep_job job = {.count = build->n,
+                                      .context = build,
+                                      .open = open_worker,
+                                      .close = close_worker,
+                                      .work = solve_slab,
+                                      .arrived = count_arrival,
+                                      .keep_path = build->options->keep_path,
+                                      .key = module_description_hash(build->module) ^ (build->n << 32) ^
+                                             (uint64_t)(1e9 * build->options->size_m),
+                                      .stop = build->options->stop};
+        build->mesh = mesh;
+        outcome = finish(build, sweep_run(&job, results, error->text, sizeof error->text), results, image, error);
+    }
+    for (size_t i = 0; i < build->n && results != NULL; i++) {
+        free(results[i].bytes);
+    }
+    free(results);
+    section_mesh_free(mesh);
+    return outcome;
+}
+
+enum sweep_outcome table_build(const struct module_description *module, const struct table_build_options *options,
                  struct table_image *image, struct description_error *error) {
     struct build build = {.module = module, .options = options};
     memset(image, 0, sizeof *image);
@@ -316,14 +408,14 @@ bool table_build(const struct module_description *module, const struct table_bui
     if (build.n < TABLE_NODES_LEAST || build.n > BEND_TABLE_AXIS_NODES_MAX) {
         (void)snprintf(error->text, sizeof error->text, "a table takes %d to %u nodes on each axis, not %zu",
                        TABLE_NODES_LEAST, BEND_TABLE_AXIS_NODES_MAX, build.n);
-        return false;
+        return SWEEP_FAILED;
     }
     if (!section_is_symmetric(module)) {
         (void)snprintf(error->text, sizeof error->text,
                        "module %s: tables are built for three equal chambers that are symmetric about their axis; "
                        "describe one such chamber",
                        module->name);
-        return false;
+        return SWEEP_FAILED;
     }
     build.total = build.n * (build.n + 1) * (build.n + 2) / 6;
     for (size_t i = 0; i < build.n; i++) {
@@ -331,15 +423,15 @@ bool table_build(const struct module_description *module, const struct table_bui
                            pow((double)i / (double)(build.n - 1), AXIS_EXPONENT);
     }
     build.node = calloc(build.n * build.n * build.n, sizeof *build.node);
-    bool built = false;
+    enum sweep_outcome outcome = SWEEP_FAILED;
     if (build.node == NULL) {
         (void)snprintf(error->text, sizeof error->text, "out of memory for the table's nodes");
     } else {
-        built = run(&build, image, error);
+        outcome = run(&build, image, error);
     }
     free(build.node);
     free(build.base);
-    return built;
+    return outcome;
 }
 
 void table_image_free(struct table_image *image) {

@@ -6,6 +6,7 @@
 #include <signal.h>
 
 #include "description/module_description.h"
+#include "sweep/sweep.h"
 
 #define TABLE_NODES_DEFAULT 17
 #define TABLE_NODES_LEAST 4
@@ -16,6 +17,7 @@ struct table_build_options {
     void (*progress)(void *context, size_t done, size_t total); /* called by one thread at a time; may be NULL */
     void *context;
     const volatile sig_atomic_t *stop; /* set to give up; may be NULL */
+    const char *keep_path;             /* keeps finished slabs there and goes on from them; NULL: no */
 };
 
 struct table_image {
@@ -27,8 +29,9 @@ struct table_image {
     size_t newton_iterations;
 };
 
-/* False: `error` says why (not symmetric, no mesh, interrupted, out of memory). Free with table_image_free(). */
-bool table_build(const struct module_description *module, const struct table_build_options *options,
+/* The image where the outcome is SWEEP_DONE (free with table_image_free()); `error` where it is SWEEP_FAILED (not symmetric,
+ * no mesh, out of memory) or SWEEP_STOPPED. Under mpirun every rank calls it; rank 0 gets the image. */
+enum sweep_outcome table_build(const struct module_description *module, const struct table_build_options *options,
                  struct table_image *image, struct description_error *error);
 void table_image_free(struct table_image *image);
 bool table_image_write(const struct table_image *image, const char *path, char *error, size_t error_bytes);

@@ -19,10 +19,11 @@ awk 'BEGIN {
 passed=0 failed=0
 while read -r command; do
     command=${command//build\//$build/}
+    [ "$(id -u)" = 0 ] && command=${command/mpirun/mpirun --allow-run-as-root --oversubscribe}
     command=${command/TENSILE.csv/$scratch/TENSILE.csv}
     command=${command/my-material.yaml/$scratch/my-material.yaml}
     echo "[ RUN      ] $command"
-    if $command >"$scratch/out" 2>&1; then
+    if $command </dev/null >"$scratch/out" 2>&1; then
         echo "[       OK ] $command"
         passed=$((passed + 1))
     else
@@ -31,6 +32,6 @@ while read -r command; do
         echo "           $command"
         failed=$((failed + 1))
     fi
-done < <(grep -E '^    build/' README.md | sed 's/^ *//')
+done < <(grep -E '^    (mpirun .*)?build/' README.md | sed 's/^ *//')
 echo "[  PASSED  ] $passed test(s)."
-[ "$failed" -eq 0 ] && [ "$passed" -ge 8 ]
+[ "$failed" -eq 0 ] && [ "$passed" -eq "$(grep -cE '^    (mpirun .*)?build/' README.md)" ]

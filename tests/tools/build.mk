@@ -3,7 +3,7 @@
 JOBS := $(shell nproc 2>/dev/null || echo 1)
 
 BUILD_PACKAGES := gcc libc6-dev pkg-config libgmsh-dev libsuitesparse-dev libgsl-dev libcyaml-dev libyaml-dev \
-                  zlib1g-dev libcmocka-dev gnuplot-nox fonts-dejavu-core
+                  libopenmpi-dev openmpi-bin zlib1g-dev libcmocka-dev gnuplot-nox fonts-dejavu-core
 LINT_PACKAGES  := clang clang-tidy cppcheck gcc-arm-none-eabi libnewlib-arm-none-eabi
 
 # --- sources: a folder is a layer; arrows between layers are include paths below
@@ -29,7 +29,8 @@ EXACT := -ffp-contract=off
 INCLUDES := -Ifirmware -Ihal -Imodel -Ihost -Itests
 FIRMWARE_FLAGS := -std=c11 $(WARNINGS) -Wdouble-promotion $(EXACT) -fno-math-errno -Ifirmware -Ihal
 COMMON_FLAGS   := -std=gnu11 -D_GNU_SOURCE $(WARNINGS) $(EXACT) $(INCLUDES)
-MODEL_FLAGS    := $(COMMON_FLAGS) -fopenmp
+MPI_FLAGS      := $(patsubst -I%,-isystem %,$(shell pkg-config --cflags-only-I mpi-c 2>/dev/null))
+MODEL_FLAGS    := $(COMMON_FLAGS) -fopenmp $(MPI_FLAGS)
 
 # --- objects and programs
 object = $(patsubst %.c,$(BUILD)/%.o,$(1))
@@ -45,7 +46,7 @@ PROGRAMS := $(BUILD)/tribend-tables $(BUILD)/tribend
 TEST_PROGRAMS  := $(patsubst %.c,$(BUILD)/%,$(TEST_C))
 BENCH_PROGRAMS := $(patsubst %.c,$(BUILD)/%,$(BENCH_C))
 
-MODEL_LIBS := -lgmsh -lcholmod -lgsl -lgslcblas -lcyaml -lyaml -lz -fopenmp -lm
+MODEL_LIBS := $(shell pkg-config --libs mpi-c 2>/dev/null) -lgmsh -lcholmod -lgsl -lgslcblas -lcyaml -lyaml -lz -fopenmp -lm
 
 # V=1 shows the commands in full.
 say = $(if $(V),,@echo '  cc $<';)
@@ -95,7 +96,7 @@ lint-firmware:
 	@set -e; for c in "gcc -O2" "clang -O2" "arm-none-eabi-gcc $(ARM_FLAGS)"; do for f in $(FIRMWARE_C); do \
 	    $$c $(FIRMWARE_FLAGS) -c $$f -o /dev/null || { echo "lint: $$c rejects $$f"; exit 1; }; done; done
 lint-clang:
-	@set -e; for f in $(HOST_SIDE_C); do clang -O1 $(COMMON_FLAGS) -Wno-unknown-pragmas -Wno-source-uses-openmp \
+	@set -e; for f in $(HOST_SIDE_C); do clang -O1 $(COMMON_FLAGS) $(MPI_FLAGS) -Wno-unknown-pragmas -Wno-source-uses-openmp \
 	    -fopenmp -fsyntax-only $$f; done
 lint-cppcheck:
 	@cppcheck -j$(JOBS) $(CPPCHECK_FLAGS) $(FIRMWARE_C) $(SIM_C) $(MODEL_C) $(TABLES_CLI_C) $(HOST_C) $(HOST_MAIN)
@@ -103,5 +104,5 @@ lint-cppcheck:
 tidy = printf '%s\n' $(1) | xargs -P $(JOBS) -I FILE clang-tidy --quiet FILE -- $(2) 2>/dev/null
 lint-tidy:
 	@$(call tidy,$(FIRMWARE_C),$(FIRMWARE_FLAGS))
-	@$(call tidy,$(SIM_C) $(MODEL_C) $(TABLES_CLI_C) $(HOST_C) $(HOST_MAIN),$(COMMON_FLAGS) \
+	@$(call tidy,$(SIM_C) $(MODEL_C) $(TABLES_CLI_C) $(HOST_C) $(HOST_MAIN),$(COMMON_FLAGS) $(MPI_FLAGS) \
 	    -Wno-unknown-pragmas -Wno-source-uses-openmp)
