@@ -5,12 +5,11 @@
 #include <string.h>
 #include <sys/resource.h>
 #include <time.h>
-#include <unistd.h>
+
 
 #include "cli/cli.h"
 #include "table/table_builder.h"
 
-#define BAR_WIDTH 40
 
 struct arguments {
     const char *module;
@@ -74,21 +73,6 @@ static const struct argp parser = {options, parse, "MODULE",
                                    "every core of this machine, or with mpirun -n RANKS on many machines.",
                                    NULL, NULL, NULL};
 
-/* A bar that redraws itself on a terminal, a line for each tenth elsewhere. */
-static void show_progress(void *context, size_t done, size_t total) {
-    const bool terminal = *(const bool *)context;
-    if (terminal) {
-        const int filled = (int)(done * BAR_WIDTH / total);
-        fprintf(stderr, "\r[%.*s%*s] %3zu %% (%zu of %zu equilibria)", filled,
-                "########################################", BAR_WIDTH - filled, "", 100 * done / total, done, total);
-        if (done == total) {
-            fputc('\n', stderr);
-        }
-    } else if (done * 10 / total != (done - 1) * 10 / total) {
-        fprintf(stderr, "%3zu %% (%zu of %zu equilibria)\n", 100 * done / total, done, total);
-    }
-}
-
 static double seconds(void) {
     struct timespec now;
     (void)clock_gettime(CLOCK_MONOTONIC, &now);
@@ -106,7 +90,7 @@ static int run(struct arguments *arguments, bool first_rank) {
     struct module_description module;
     struct description_error error;
     struct table_image image;
-    bool terminal = isatty(STDERR_FILENO) != 0;
+    struct cli_progress progress = {.what = "equilibria"};
     cli_table_path("modules", arguments->module, path);
     if (!module_description_read(path, arguments->material, &module, &error)) {
         return first_rank ? program_fail(EXIT_BAD_INPUT, "%s", error.text) : EXIT_BAD_INPUT;
@@ -120,8 +104,8 @@ static int run(struct arguments *arguments, bool first_rank) {
     }
     program_catch_interrupt();
     arguments->build.stop = &program_interrupted;
-    arguments->build.progress = arguments->quiet || !first_rank ? NULL : show_progress;
-    arguments->build.context = &terminal;
+    arguments->build.progress = arguments->quiet || !first_rank ? NULL : cli_show_progress;
+    arguments->build.context = &progress;
     arguments->build.keep_path = arguments->resume ? keep : NULL;
     const double start_s = seconds();
     const enum sweep_outcome outcome = table_build(&module, &arguments->build, &image, &error);
@@ -129,8 +113,7 @@ static int run(struct arguments *arguments, bool first_rank) {
         return EXIT_OK;
     }
     if (outcome != SWEEP_DONE) {
-        return program_fail(outcome == SWEEP_STOPPED ? EXIT_INTERRUPTED : EXIT_SOLVER, "%s%s", terminal ? "\n" : "",
-                            error.text);
+        return program_fail(outcome == SWEEP_STOPPED ? EXIT_INTERRUPTED : EXIT_SOLVER, "%s", error.text);
     }
     const bool written = table_image_write(&image, output, message, sizeof message);
     if (written) {

@@ -14,12 +14,18 @@ int cli_show(int argc, char **argv);
 int cli_plot(int argc, char **argv);
 int cli_fit(int argc, char **argv);
 int cli_material(int argc, char **argv);
+int cli_study(int argc, char **argv);
 int cli_published(int argc, char **argv);
 
 /* The file of a module or material: `name` itself where it is a path, else tables/FOLDER/NAME.yaml. */
 void cli_table_path(const char *folder, const char *name, char path[PROGRAM_PATH_BYTES]);
 /* An element size from the command line, or argp's complaint. */
 void cli_mesh_size(struct argp_state *state, const char *argument, double *size_m);
+/* For the progress of sweeps: `context` is a struct cli_progress. */
+struct cli_progress {
+    const char *what; /* is counted */
+};
+void cli_show_progress(void *context, size_t done, size_t total);
 void cli_print_material(const struct material *material);
 
 #endif

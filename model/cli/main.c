@@ -2,11 +2,13 @@
 #include <gsl/gsl_errno.h>
 #include <stdio.h>
 #include <string.h>
+#include <unistd.h>
 
 #include "cli/cli.h"
 #include "units/units.h"
 
 #define MESH_SIZE_LEAST_M 1e-4
+#define BAR_WIDTH 40
 
 static const struct program_subcommand subcommands[] = {
     {"solve", cli_solve, "follow a module's equilibria under pressure, up to a pressure or a bend"},
@@ -15,6 +17,7 @@ static const struct program_subcommand subcommands[] = {
     {"plot", cli_plot, "draw a bend table"},
     {"fit", cli_fit, "fit material laws to tensile tests"},
     {"material", cli_material, "say over which stretch a material law may be used"},
+    {"study", cli_study, "reproduce a parametric study of the founding paper"},
     {"published", cli_published, "hold the solver against the founding paper's figures"}};
 
 void cli_table_path(const char *folder, const char *name, char path[PROGRAM_PATH_BYTES]) {
@@ -34,6 +37,18 @@ void cli_mesh_size(struct argp_state *state, const char *argument, double *size_
         argp_error(state, "--mesh-size: %s", error);
     } else if (!(*size_m >= MESH_SIZE_LEAST_M)) {
         argp_error(state, "--mesh-size: %s is under 0.1mm", argument);
+    }
+}
+
+/* A bar that redraws itself on a terminal, a line for each tenth elsewhere. */
+void cli_show_progress(void *context, size_t done, size_t total) {
+    const struct cli_progress *progress = context;
+    if (isatty(STDERR_FILENO) != 0) {
+        const int filled = (int)(done * BAR_WIDTH / total);
+        fprintf(stderr, "\r[%.*s%*s] %3zu %% (%zu of %zu %s)%s", filled, "########################################",
+                BAR_WIDTH - filled, "", 100 * done / total, done, total, progress->what, done == total ? "\n" : "");
+    } else if (done > 0 && done * 10 / total != (done - 1) * 10 / total) {
+        fprintf(stderr, "%3zu %% (%zu of %zu %s)\n", 100 * done / total, done, total, progress->what);
     }
 }
 
