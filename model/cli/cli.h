@@ -14,6 +14,7 @@ int cli_show(int argc, char **argv);
 int cli_plot(int argc, char **argv);
 int cli_fit(int argc, char **argv);
 int cli_material(int argc, char **argv);
+int cli_stiffness(int argc, char **argv);
 int cli_study(int argc, char **argv);
 int cli_published(int argc, char **argv);
 
@@ -26,6 +27,9 @@ struct cli_progress {
     const char *what; /* is counted */
 };
 void cli_show_progress(void *context, size_t done, size_t total);
+const char *cli_base_name(const char *path);
+/* A material file; its name is `name`, or the file's where that is NULL. */
+bool cli_write_material(const char *path, const char *name, const struct material *material, char *error, size_t bytes);
 void cli_print_material(const struct material *material);
 
 #endif

@@ -10,7 +10,6 @@
 #include "cli/material_report.h"
 #include "material/material_fit.h"
 #include "program/gnuplot.h"
-#include "program/output_file.h"
 
 #define TESTS_MAX 8
 
@@ -130,11 +129,6 @@ static const struct argp parser = {options, parse, "TENSILE.csv[:MODE]...",
                                    "how a specimen was pulled: uniaxial (default), shear or equibiaxial.",
                                    NULL, NULL, NULL};
 
-static const char *base_name(const char *path) {
-    const char *slash = strrchr(path, '/');
-    return slash == NULL ? path : slash + 1;
-}
-
 static void print_fit(const struct material_fit *fit) {
     const struct material *material = &fit->material;
     for (size_t i = 0; i < material->terms; i++) {
@@ -163,37 +157,15 @@ static void print_comparison(const struct results *results) {
     printf("\nlaw            %s\n", laws[results->law[results->best]].name);
 }
 
-static void write_list(FILE *stream, const char *key, const double *value, size_t count) {
-    fprintf(stream, "%s: [", key);
-    for (size_t i = 0; i < count; i++) {
-        fprintf(stream, "%s%.6g", i == 0 ? "" : ", ", value[i]);
-    }
-    fputs("]\n", stream);
-}
-
-static bool write_yaml(const struct arguments *arguments, const struct material_fit *fit, char *error, size_t bytes) {
-    static const char *const law[] = {"neo-hookean", "reduced-polynomial", "yeoh", "ogden"};
-    struct output_file file;
-    const struct material *material = &fit->material;
-    char name[MATERIAL_NAME_BYTES];
-    (void)snprintf(name, sizeof name, "%s", arguments->name != NULL ? arguments->name : base_name(arguments->output));
-    name[strcspn(name, ".")] = '\0';
-    if (!output_file_open(&file, arguments->output, error, bytes)) {
-        return false;
-    }
-    fprintf(file.stream, "name: %s\nlaw: %s\n", name, law[material->law]);
-    write_list(file.stream, "coefficients_pa", material->coefficient_pa, material->terms);
-    if (material->law == MATERIAL_OGDEN) {
-        write_list(file.stream, "exponents", material->exponent, material->terms);
-    }
-    fprintf(file.stream,
-            "density_kgpm3: %.6g\nbulk_modulus_pa: %.3e\nstrain_min: %.6g\nstrain_max: %.6g\n"
-            "source: \"measured: %.200s%s, least squares of the nominal stress over 0 to %.0f %% strain%s, rms %.2f %% of "
-            "the greatest stress; density and bulk modulus assumed\"\n",
-            material->density_kgpm3, material->bulk_modulus_pa, material->strain_min, material->strain_max,
-            base_name(arguments->path[0]), arguments->tests > 1 ? " and others" : "", 100.0 * material->strain_max,
-            arguments->free ? "" : " with bounds that keep the law stable", 100.0 * fit->rms_relative);
-    return output_file_commit(&file, error, bytes);
+static bool write_yaml(const struct arguments *arguments, struct material_fit *fit, char *error, size_t bytes) {
+    struct material *material = &fit->material;
+    (void)snprintf(material->source, sizeof material->source,
+                   "measured: %.200s%s, least squares of the nominal stress over 0 to %.0f %% strain%s, rms %.2f %% of the "
+                   "greatest stress; density and bulk modulus assumed",
+                   cli_base_name(arguments->path[0]), arguments->tests > 1 ? " and others" : "",
+                   100.0 * material->strain_max, arguments->free ? "" : " with bounds that keep the law stable",
+                   100.0 * fit->rms_relative);
+    return cli_write_material(arguments->output, arguments->name, material, error, bytes);
 }
 
 static bool draw(const struct arguments *arguments, const struct tensile_test *tests, const struct results *results,
@@ -206,7 +178,7 @@ static bool draw(const struct arguments *arguments, const struct tensile_test *t
     fprintf(plot.script,
             "set title '%s' noenhanced\nset grid\nset key left top\nset xlabel 'engineering strain / %%'\n"
             "set ylabel 'nominal stress / kPa'\nset xrange [0:%.3f]\nplot ",
-            base_name(arguments->path[0]), 102.0 * strain_max);
+            cli_base_name(arguments->path[0]), 102.0 * strain_max);
     for (size_t t = 0; t < arguments->tests; t++) {
         fprintf(plot.script, "'-' w p pt 6 ps 0.6 lc %zu t 'test, %s', ", t + 1, deformation_mode_name[tests[t].mode]);
     }
@@ -262,7 +234,7 @@ static int run(const struct arguments *arguments, const struct tensile_test *tes
     if (!fit_laws(arguments, tests, &results, message, sizeof message)) {
         return program_fail(EXIT_BAD_INPUT, "%s: %s", arguments->path[0], message);
     }
-    const struct material_fit *best = &results.fit[results.best];
+    struct material_fit *best = &results.fit[results.best];
     if (results.count > 1) {
         print_comparison(&results);
     }

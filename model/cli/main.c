@@ -5,6 +5,7 @@
 #include <unistd.h>
 
 #include "cli/cli.h"
+#include "program/output_file.h"
 #include "units/units.h"
 
 #define MESH_SIZE_LEAST_M 1e-4
@@ -17,6 +18,7 @@ static const struct program_subcommand subcommands[] = {
     {"plot", cli_plot, "draw a bend table"},
     {"fit", cli_fit, "fit material laws to tensile tests"},
     {"material", cli_material, "say over which stretch a material law may be used"},
+    {"stiffness", cli_stiffness, "fit the stiffness of a real module to the plateaus of a run"},
     {"study", cli_study, "reproduce a parametric study of the founding paper"},
     {"published", cli_published, "hold the solver against the founding paper's figures"}};
 
@@ -64,6 +66,40 @@ void cli_print_material(const struct material *material) {
         }
     }
     printf("; bulk modulus %.3g Pa)\n          %s\n", material->bulk_modulus_pa, material->source);
+}
+
+const char *cli_base_name(const char *path) {
+    const char *slash = strrchr(path, '/');
+    return slash == NULL ? path : slash + 1;
+}
+
+static void write_list(FILE *stream, const char *key, const double *value, size_t count) {
+    fprintf(stream, "%s: [", key);
+    for (size_t i = 0; i < count; i++) {
+        fprintf(stream, "%s%.6g", i == 0 ? "" : ", ", value[i]);
+    }
+    fputs("]\n", stream);
+}
+
+bool cli_write_material(const char *path, const char *name, const struct material *material, char *error, size_t bytes) {
+    static const char *const law[] = {"neo-hookean", "reduced-polynomial", "yeoh", "ogden"};
+    struct output_file file;
+    char own[MATERIAL_NAME_BYTES];
+    (void)snprintf(own, sizeof own, "%s", name != NULL ? name : cli_base_name(path));
+    own[strcspn(own, ".")] = '\0';
+    if (!output_file_open(&file, path, error, bytes)) {
+        return false;
+    }
+    fprintf(file.stream, "name: %s\nlaw: %s\n", own, law[material->law]);
+    write_list(file.stream, "coefficients_pa", material->coefficient_pa, material->terms);
+    if (material->law == MATERIAL_OGDEN) {
+        write_list(file.stream, "exponents", material->exponent, material->terms);
+    }
+    fprintf(file.stream,
+            "density_kgpm3: %.6g\nbulk_modulus_pa: %.3e\nstrain_min: %.6g\nstrain_max: %.6g\nsource: \"%s\"\n",
+            material->density_kgpm3, material->bulk_modulus_pa, material->strain_min, material->strain_max,
+            material->source);
+    return output_file_commit(&file, error, bytes);
 }
 
 int main(int argc, char **argv) {

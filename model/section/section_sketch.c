@@ -16,34 +16,28 @@
 #define SIZE_LEAST 0.1        /* of the size at the walls */
 #define GMSH_TRIANGLE_6 9
 
-/* Thin wrappers that collect gmsh's failures in one flag. */
-struct sketch {
-    int failed;
-    int threads; /* OpenMP's setting, which gmsh overwrites for the whole program */
-};
-
-static int add_point(struct sketch *sketch, const double point_m[2]) {
+static int add_point(struct section_sketch *sketch, const double point_m[2]) {
     int error = 0;
     const int tag = gmshModelOccAddPoint(point_m[0], point_m[1], 0.0, 0.0, -1, &error);
     sketch->failed |= error;
     return tag;
 }
 
-static int add_line(struct sketch *sketch, int from, int to) {
+static int add_line(struct section_sketch *sketch, int from, int to) {
     int error = 0;
     const int tag = gmshModelOccAddLine(from, to, -1, &error);
     sketch->failed |= error;
     return tag;
 }
 
-static int add_arc(struct sketch *sketch, int from, int centre, int to) {
+static int add_arc(struct section_sketch *sketch, int from, int centre, int to) {
     int error = 0;
     const int tag = gmshModelOccAddCircleArc(from, centre, to, -1, &error);
     sketch->failed |= error;
     return tag;
 }
 
-static int add_surface(struct sketch *sketch, int *curves, size_t count) {
+static int add_surface(struct section_sketch *sketch, int *curves, size_t count) {
     int error = 0;
     int loop = gmshModelOccAddCurveLoop(curves, count, -1, &error);
     sketch->failed |= error;
@@ -52,14 +46,14 @@ static int add_surface(struct sketch *sketch, int *curves, size_t count) {
     return tag;
 }
 
-static int add_disc(struct sketch *sketch, double radius_m) {
+static int add_disc(struct section_sketch *sketch, double radius_m) {
     int error = 0;
     const int tag = gmshModelOccAddDisk(0.0, 0.0, 0.0, radius_m, radius_m, -1, &error);
     sketch->failed |= error;
     return tag;
 }
 
-static int add_half_wedge(struct sketch *sketch, double radius_m) {
+static int add_half_wedge(struct section_sketch *sketch, double radius_m) {
     const double centre_m[2] = {0.0, 0.0}, start_m[2] = {radius_m, 0.0};
     const double end_m[2] = {radius_m * cos(PI / 3.0), radius_m * sin(PI / 3.0)};
     const int centre = add_point(sketch, centre_m), start = add_point(sketch, start_m), end = add_point(sketch, end_m);
@@ -68,7 +62,7 @@ static int add_half_wedge(struct sketch *sketch, double radius_m) {
 }
 
 /* Arcs are drawn as two halves: an arc of 180 degrees would leave its side open. */
-static int add_cavity(struct sketch *sketch, const struct cavity *cavity) {
+int section_sketch_cavity(struct section_sketch *sketch, const struct cavity *cavity) {
     struct cavity_piece piece[CAVITY_PIECES_MAX];
     const size_t count = cavity_outline(cavity, piece);
     int curves[2 * CAVITY_PIECES_MAX], first = add_point(sketch, piece[0].from_m), from = first;
@@ -89,7 +83,7 @@ static int add_cavity(struct sketch *sketch, const struct cavity *cavity) {
     return add_surface(sketch, curves, curve);
 }
 
-static void cut(struct sketch *sketch, int *surface, int *tools, size_t count) {
+static void cut(struct section_sketch *sketch, int *surface, int *tools, size_t count) {
     int error = 0, *out = NULL, **map = NULL;
     size_t outs = 0, *map_sizes = NULL, maps = 0;
     gmshModelOccCut(surface, 2, tools, 2 * count, &out, &outs, &map, &map_sizes, &maps, -1, 1, 1, &error);
@@ -106,7 +100,7 @@ static void cut(struct sketch *sketch, int *surface, int *tools, size_t count) {
 }
 
 /* Splits the surface along curves and at points, which then lie on element sides and corners. */
-static void split(struct sketch *sketch, int *surface, int *tools, size_t count) {
+static void split(struct section_sketch *sketch, int *surface, int *tools, size_t count) {
     int error = 0, *out = NULL, **map = NULL;
     size_t outs = 0, *map_sizes = NULL, maps = 0;
     gmshModelOccFragment(surface, 2, tools, 2 * count, &out, &outs, &map, &map_sizes, &maps, -1, 1, 1, &error);
@@ -129,14 +123,14 @@ static bool centre_is_solid(const struct section_plan *plan) {
     return plan->bore_radius_m == 0.0;
 }
 
-static void draw(struct sketch *sketch, const struct section_plan *plan, bool half_wedge) {
+static void draw(struct section_sketch *sketch, const struct section_plan *plan, bool half_wedge) {
     int surface[2] = {2, half_wedge ? add_half_wedge(sketch, plan->outer_radius_m)
                                     : add_disc(sketch, plan->outer_radius_m)};
     int tools[2 * (SECTION_CAVITIES_MAX + 1)], count = 0;
     for (size_t i = 0; i < plan->cavity_count; i++) {
         if (!half_wedge || plan->chamber[i] == 0) {
             tools[2 * count] = 2;
-            tools[2 * count++ + 1] = add_cavity(sketch, &plan->cavity[i]);
+            tools[2 * count++ + 1] = section_sketch_cavity(sketch, &plan->cavity[i]);
         }
     }
     if (plan->bore_radius_m > 0.0) {
@@ -180,7 +174,7 @@ static double corner_distance(const struct cavity *cavity, const double point_m[
 
 /* Element size at a point: fine at the cavities and finer at their corners, coarser away from them, two elements through
  * any wall. */
-static double size_at(int dimension, int tag, double x, double y, double z, void *context) {
+double section_sketch_size(int dimension, int tag, double x, double y, double z, void *context) {
     const struct section_plan *plan = context;
     const double point_m[2] = {x, y}, radius_m = hypot(x, y);
     double nearest_m = fmax(0.0, plan->outer_radius_m - radius_m), second_m = INFINITY, cavity_m = INFINITY;
@@ -242,7 +236,7 @@ static struct section_mesh *take_arrays(const size_t *tag, size_t tags, const do
     return mesh;
 }
 
-static struct section_mesh *generate(struct sketch *sketch, struct section_plan *plan) {
+static struct section_mesh *generate(struct section_sketch *sketch, struct section_plan *plan) {
     int error = sketch->failed;
     size_t *tag = NULL, *element = NULL, *corner = NULL, tags = 0, elements = 0, corners = 0, coordinates = 0, none = 0;
     double *coordinate = NULL, *parametric = NULL;
@@ -251,7 +245,7 @@ static struct section_mesh *generate(struct sketch *sketch, struct section_plan 
         gmshModelOccSynchronize(&error);
     }
     if (error == 0) {
-        gmshModelMeshSetSizeCallback(size_at, plan, &error);
+        gmshModelMeshSetSizeCallback(section_sketch_size, plan, &error);
     }
     if (error == 0) {
         gmshModelMeshGenerate(2, &error);
@@ -276,21 +270,32 @@ static struct section_mesh *generate(struct sketch *sketch, struct section_plan 
     return mesh;
 }
 
-struct section_mesh *section_sketch_mesh(const struct section_plan *plan, bool half_wedge) {
-    struct section_plan copy = *plan;
-    struct sketch sketch = {.threads = omp_get_max_threads()};
+void section_sketch_begin(struct section_sketch *sketch) {
     int error = 0;
+    sketch->failed = 0;
+    sketch->threads = omp_get_max_threads();
     gmshInitialize(0, NULL, 0, &error);
-    sketch.failed |= error;
+    sketch->failed |= error;
     gmshOptionSetNumber("General.Terminal", 0.0, &error);
     gmshOptionSetNumber("General.NumThreads", 1.0, &error); /* the same mesh on every machine */
     gmshOptionSetNumber("Mesh.MeshSizeExtendFromBoundary", 0.0, &error);
     gmshOptionSetNumber("Mesh.MeshSizeFromPoints", 0.0, &error);
     gmshModelAdd("section", &error);
-    sketch.failed |= error;
+    sketch->failed |= error;
+}
+
+void section_sketch_end(const struct section_sketch *sketch) {
+    int error = 0;
+    gmshFinalize(&error);
+    omp_set_num_threads(sketch->threads);
+}
+
+struct section_mesh *section_sketch_mesh(const struct section_plan *plan, bool half_wedge) {
+    struct section_plan copy = *plan;
+    struct section_sketch sketch;
+    section_sketch_begin(&sketch);
     draw(&sketch, plan, half_wedge);
     struct section_mesh *mesh = generate(&sketch, &copy);
-    gmshFinalize(&error);
-    omp_set_num_threads(sketch.threads);
+    section_sketch_end(&sketch);
     return mesh;
 }

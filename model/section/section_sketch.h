@@ -19,6 +19,18 @@ struct section_plan {
     double size_m; /* element edge at the cavities' walls */
 };
 
+/* A drawing in gmsh's OpenCASCADE kernel; `failed` collects the errors of every call. */
+struct section_sketch {
+    int failed;
+    int threads; /* OpenMP's setting, which gmsh overwrites for the whole program */
+};
+void section_sketch_begin(struct section_sketch *sketch);
+void section_sketch_end(const struct section_sketch *sketch);
+/* The cavity as a plane surface; its tag. */
+int section_sketch_cavity(struct section_sketch *sketch, const struct cavity *cavity);
+/* Element size at a point, for gmsh's size callback; `plan` is a struct section_plan. */
+double section_sketch_size(int dimension, int tag, double x, double y, double z, void *plan);
+
 /* Triangles of the whole section, or of the half-wedge from 0 to 60 degrees: positions and triangles only, the rest of
  * the mesh is empty. NULL where gmsh fails or memory ends. */
 struct section_mesh *section_sketch_mesh(const struct section_plan *plan, bool half_wedge);
