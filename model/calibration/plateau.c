@@ -140,13 +140,14 @@ static bool read_rows(const char *path, struct rows *rows, char *error, size_t e
 /* Means over the last half of rows [from, to); quaternions of either sign mean the same pose. */
 static void average(const struct rows *rows, size_t from, size_t to, double mean[COLUMNS]) {
     const double *last = rows->value[to - 1];
+    const size_t start = from + (to - from) / 2;
     double length = 0.0;
     memset(mean, 0, COLUMNS * sizeof *mean);
-    for (size_t i = from + (to - from) / 2; i < to; i++) {
+    for (size_t i = start; i < to; i++) {
         const double *row = rows->value[i];
         const double dot = row[3] * last[3] + row[4] * last[4] + row[5] * last[5] + row[6] * last[6];
         for (size_t c = 0; c < COLUMNS; c++) {
-            mean[c] += c < 3 ? row[c] / (double)(to - from - (to - from) / 2) : copysign(1.0, dot) * row[c];
+            mean[c] += c < 3 ? row[c] / (double)(to - start) : copysign(1.0, dot) * row[c];
         }
     }
     for (size_t c = 3; c < COLUMNS; c++) {

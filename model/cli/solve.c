@@ -13,6 +13,7 @@
 
 #define DEGREES (180.0 / M_PI)
 #define ROWS_SHOWN_EVERY 4
+enum limit { LIMIT_POINT, LIMIT_BIFURCATION, LIMIT_STRETCH, LIMIT_ELLIPTICITY, LIMIT_CONTACT, LIMITS };
 
 struct arguments {
     const char *module;
@@ -99,28 +100,78 @@ struct report {
     double rest_area_m2;
     size_t loaded; /* the chamber whose volume is reported */
     size_t points;
+    struct section_state last;
+    double greatest_pa;
+    double limit_pa[LIMITS]; /* where each end of the valid range was first met, NAN: not */
 };
+
+/* What may end the range over which the answers hold. */
+static const char *const limit_name[LIMITS] = {
+    "limit point: the pressure turns back there, and a module snaps",
+    "bifurcation: stability is lost while the pressure still rises; another branch starts there",
+    "the material's fitted stretch is passed",
+    "the material loses ellipticity: no answer beyond can be trusted",
+    "walls touch, which is not modelled: no answer beyond can be trusted"};
 
 static double bend_of(const struct report *report, const struct section_state *state) {
     return hypot(state->curvature_x_1pm, state->curvature_y_1pm) * report->active_length_m;
 }
 
 static void print_row(const struct report *report, const struct section_state *state) {
-    printf("%10.1f %8.3f %8.4f %8.3f %9.3f %9.3f %11.1f %8.3f  %s%s%s\n", state->pressure_pa[report->loaded],
+    printf("%10.1f %8.3f %8.4f %8.3f %9.3f %9.3f %11.1f %8.3f  %s%s%s%s\n", state->pressure_pa[report->loaded],
            bend_of(report, state) * DEGREES, state->stretch,
            state->volume_m2[report->loaded] / report->rest_area_m2, 1e3 * state->width_bend_plane_m,
            1e3 * state->width_across_m, 1e-3 * state->von_mises_apex_pa, state->stretch_max,
            state->stable ? "stable" : "unstable", state->beyond_strain ? ", beyond fit" : "",
-           state->contact ? ", walls touch" : "");
+           state->contact ? ", walls touch" : "", state->elliptic ? "" : ", not elliptic");
+}
+
+static void meet(struct report *report, enum limit limit, double pressure_pa) {
+    if (isnan(report->limit_pa[limit])) {
+        report->limit_pa[limit] = pressure_pa;
+    }
+}
+
+static void note_limits(struct report *report, const struct section_state *state) {
+    const double pressure_pa = state->pressure_pa[report->loaded];
+    if (!state->stable) {
+        meet(report, pressure_pa < report->greatest_pa ? LIMIT_POINT : LIMIT_BIFURCATION,
+             fmax(pressure_pa, report->greatest_pa));
+    }
+    if (state->beyond_strain) {
+        meet(report, LIMIT_STRETCH, pressure_pa);
+    }
+    if (!state->elliptic) {
+        meet(report, LIMIT_ELLIPTICITY, pressure_pa);
+    }
+    if (state->contact) {
+        meet(report, LIMIT_CONTACT, pressure_pa);
+    }
+    report->greatest_pa = fmax(report->greatest_pa, pressure_pa);
+}
+
+static void print_limits(const struct report *report) {
+    bool first = true;
+    for (int limit = 0; limit < LIMITS; limit++) {
+        /* unstable after the limit point is the falling branch, not a bifurcation */
+        const bool fallen = limit == LIMIT_BIFURCATION && !isnan(report->limit_pa[LIMIT_POINT]);
+        if (!isnan(report->limit_pa[limit]) && !fallen) {
+            printf("%s %.0f Pa: %s\n", first ? "limits    from" : "          from", report->limit_pa[limit], limit_name[limit]);
+            first = false;
+        }
+    }
 }
 
 static bool take_point(void *context, const struct section_state *state) {
     struct report *report = context;
+    note_limits(report, state);
+    report->last = *state;
     if (report->csv != NULL) {
-        fprintf(report->csv, "%.9g,%.9g,%.9g,%.9g,%.9g,%.9g,%.9g,%.9g,%.9g,%d\n", state->pressure_pa[report->loaded],
+        fprintf(report->csv, "%.9g,%.9g,%.9g,%.9g,%.9g,%.9g,%.9g,%.9g,%.9g,%d,%d,%d,%d\n", state->pressure_pa[report->loaded],
                 bend_of(report, state), hypot(state->curvature_x_1pm, state->curvature_y_1pm), state->stretch,
                 state->volume_m2[report->loaded] / report->rest_area_m2, state->width_bend_plane_m,
-                state->width_across_m, state->von_mises_apex_pa, state->stretch_max, state->stable ? 1 : 0);
+                state->width_across_m, state->von_mises_apex_pa, state->stretch_max, state->stable,
+                state->elliptic, state->contact, state->beyond_strain);
     }
     if (!report->arguments->quiet && report->points % ROWS_SHOWN_EVERY == 0) {
         print_row(report, state);
@@ -169,7 +220,7 @@ static int solve(const struct arguments *arguments, const struct module_descript
     }
     if (csv != NULL) {
         fputs("pressure_pa,bend_rad,curvature_1pm,stretch,volume_ratio,width_bend_plane_m,width_across_m,"
-              "von_mises_apex_pa,stretch_max,stable\n",
+              "von_mises_apex_pa,stretch_max,stable,elliptic,contact,beyond_strain\n",
               csv);
     }
     if (!arguments->quiet) {
@@ -179,15 +230,22 @@ static int solve(const struct arguments *arguments, const struct module_descript
                "volume", "in plane", "across", "von Mises", "greatest", "Pa", "deg", "", "ratio", "width mm", "width mm",
                "apex kPa", "stretch");
     }
-    program_catch_interrupt();
-    if (!section_solver_path(solver, direction_pa, goal, value, take_point, &report, &error)) {
-        return program_fail(program_interrupted != 0 ? EXIT_INTERRUPTED : EXIT_SOLVER, "%s: %s", module->name,
-                        program_interrupted != 0 ? "interrupted; nothing was written" : error.text);
+    for (int limit = 0; limit < LIMITS; limit++) {
+        report.limit_pa[limit] = NAN;
     }
+    program_catch_interrupt();
+    const bool reached = section_solver_path(solver, direction_pa, goal, value, take_point, &report, &error);
     if (arguments->quiet || (report.points - 1) % ROWS_SHOWN_EVERY != 0) {
-        struct section_state state;
-        section_solver_state(solver, &state);
-        print_row(&report, &state);
+        print_row(&report, &report.last);
+    }
+    if (!arguments->quiet) {
+        print_limits(&report);
+    }
+    if (!reached) {
+        (void)fflush(stdout);
+        return program_fail(program_interrupted != 0 ? EXIT_INTERRUPTED : EXIT_SOLVER, "%s: %s%s%s", module->name,
+                            program_interrupted != 0 ? "interrupted" : error.text, csv != NULL ? "; the points so far are in " : "",
+                            csv != NULL ? arguments->csv : "");
     }
     if (arguments->plot != NULL &&
         !section_plot(arguments->plot, module, mesh, solver, message, sizeof message)) {
@@ -216,7 +274,8 @@ static int run(const struct arguments *arguments) {
     } else {
         code = solve(arguments, &module, mesh, solver, csv.stream);
     }
-    if (code == EXIT_OK && csv.stream != NULL && !output_file_commit(&csv, message, sizeof message)) {
+    const bool solved_some = code == EXIT_OK || code == EXIT_SOLVER || code == EXIT_INTERRUPTED;
+    if (solved_some && csv.stream != NULL && !output_file_commit(&csv, message, sizeof message)) {
         code = program_fail(EXIT_OUTPUT, "%s", message);
     }
     output_file_discard(&csv);

@@ -149,11 +149,12 @@ static bool follow(struct path *path, double goal_value, section_path_callback c
             arc *= 0.5;
             if (arc < ARC_LEAST) {
                 (void)snprintf(error->text, sizeof error->text,
-                               "the path breaks down at %.0f Pa and %.2f 1/m: no further equilibrium was found "
-                               "(the material may lose stability there)",
+                               "the path breaks down at %.0f Pa and %.2f 1/m: no further equilibrium was found. Ask "
+                               "`tribend-tables material %s` whether its law is stable that far, or stop before",
                                path->start_factor * solver->modulus_pa,
                                hypot(path->start[solver->sparse_count + 1], path->start[solver->sparse_count + 2]) /
-                                   solver->radius_m);
+                                   solver->radius_m,
+                               solver->law[0].material.name);
                 return false;
             }
         }
@@ -179,8 +180,8 @@ static bool follow(struct path *path, double goal_value, section_path_callback c
         if (path->factor < 0.0) {
             (void)snprintf(error->text, sizeof error->text,
                            "the pressure turns back at a limit point of %.0f Pa and falls to zero: beyond it there is no "
-                           "equilibrium (the material has lost its stability)",
-                           greatest_factor * solver->modulus_pa);
+                           "equilibrium. Ask `tribend-tables material %s` how far its law is stable",
+                           greatest_factor * solver->modulus_pa, solver->law[0].material.name);
             return false;
         }
         arc = fmin(ARC_MOST, arc * (path->iterations < ARC_ITERATIONS_WANTED ? 1.4 : 0.8));
