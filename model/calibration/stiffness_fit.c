@@ -6,7 +6,7 @@
 #include <stdio.h>
 #include <string.h>
 
-#include "section/section_solver.h"
+#include "section/section_bend.h"
 
 #define CURVE_POINTS_MAX 2048
 #define FACTOR_LEAST 0.1
@@ -22,7 +22,7 @@ struct curve {
     double pressure_pa[CURVE_POINTS_MAX];
     double bend_rad[CURVE_POINTS_MAX];
     size_t count;
-    double length_m;
+    const struct module_description *module;
 };
 
 struct problem {
@@ -34,13 +34,14 @@ struct problem {
 
 static bool take_point(void *context, const struct section_state *state) {
     struct curve *curve = context;
-    const double bend_rad = hypot(state->curvature_x_1pm, state->curvature_y_1pm) * curve->length_m;
+    double bend_rad[2];
+    section_tip_bend(curve->module, state, bend_rad);
     const bool rises = curve->count == 0 || state->pressure_pa[0] > curve->pressure_pa[curve->count - 1];
     if (!rises || curve->count == CURVE_POINTS_MAX) {
         return false;
     }
     curve->pressure_pa[curve->count] = state->pressure_pa[0];
-    curve->bend_rad[curve->count++] = bend_rad;
+    curve->bend_rad[curve->count++] = hypot(bend_rad[0], bend_rad[1]);
     return true;
 }
 
@@ -49,10 +50,10 @@ static bool make_curve(const struct module_description *module, struct curve *cu
     struct section_mesh *mesh = section_mesh_create(module, NULL, error);
     struct section_solver *solver = mesh == NULL ? NULL : section_solver_create(mesh, module, error);
     curve->count = 0;
-    curve->length_m = module->chamber_length_m + module->end_correction_m;
+    curve->module = module;
     if (solver != NULL) {
         /* the curve ends where the path does: what matters is whether it reaches the plateaus */
-        (void)section_solver_path(solver, direction_pa, SECTION_GOAL_CURVATURE, CURVE_BEND_MOST_RAD / curve->length_m,
+        (void)section_solver_path(solver, direction_pa, SECTION_GOAL_CURVATURE, CURVE_BEND_MOST_RAD / module->chamber_length_m,
                                   take_point, curve, error);
     }
     const bool made = solver != NULL;

@@ -62,7 +62,7 @@ bool section_plot(const char *png_path, const struct module_description *module,
     if (drawn) {
         const double limit = extent_mm(mesh, position_m);
         const double bend = hypot(state.curvature_x_1pm, state.curvature_y_1pm) *
-                            (module->chamber_length_m + module->end_correction_m) * DEGREES;
+                            module->chamber_length_m * DEGREES;
         fprintf(plot.script,
                 "set title \"Deformed section of %s, %s\\n%.2f, %.2f, %.2f kPa in chambers 1, 2, 3: bend %.1f deg\"\n"
                 "set size ratio -1\nset grid\nset xrange [%.3f:%.3f]\nset yrange [%.3f:%.3f]\n"

@@ -8,6 +8,7 @@
 #include "cli/cli.h"
 #include "cli/section_plot.h"
 #include "program/output_file.h"
+#include "section/section_bend.h"
 #include "section/section_solver.h"
 #include "units/units.h"
 
@@ -94,6 +95,7 @@ static const struct argp parser = {options, parse, "MODULE",
 
 struct report {
     const struct arguments *arguments;
+    const struct module_description *module;
     struct section_solver *solver;
     FILE *csv;
     double active_length_m;
@@ -117,9 +119,16 @@ static double bend_of(const struct report *report, const struct section_state *s
     return hypot(state->curvature_x_1pm, state->curvature_y_1pm) * report->active_length_m;
 }
 
+/* Bend of the tip, ends included. */
+static double tip_bend_of(const struct report *report, const struct section_state *state) {
+    double bend_rad[2];
+    section_tip_bend(report->module, state, bend_rad);
+    return hypot(bend_rad[0], bend_rad[1]);
+}
+
 static void print_row(const struct report *report, const struct section_state *state) {
-    printf("%10.1f %8.3f %8.4f %8.3f %9.3f %9.3f %11.1f %8.3f  %s%s%s%s\n", state->pressure_pa[report->loaded],
-           bend_of(report, state) * DEGREES, state->stretch,
+    printf("%10.1f %8.3f %8.3f %8.4f %8.3f %9.3f %9.3f %11.1f %8.3f  %s%s%s%s\n", state->pressure_pa[report->loaded],
+           bend_of(report, state) * DEGREES, tip_bend_of(report, state) * DEGREES, state->stretch,
            state->volume_m2[report->loaded] / report->rest_area_m2, 1e3 * state->width_bend_plane_m,
            1e3 * state->width_across_m, 1e-3 * state->von_mises_apex_pa, state->stretch_max,
            state->stable ? "stable" : "unstable", state->beyond_strain ? ", beyond fit" : "",
@@ -167,11 +176,11 @@ static bool take_point(void *context, const struct section_state *state) {
     note_limits(report, state);
     report->last = *state;
     if (report->csv != NULL) {
-        fprintf(report->csv, "%.9g,%.9g,%.9g,%.9g,%.9g,%.9g,%.9g,%.9g,%.9g,%d,%d,%d,%d\n", state->pressure_pa[report->loaded],
+        fprintf(report->csv, "%.9g,%.9g,%.9g,%.9g,%.9g,%.9g,%.9g,%.9g,%.9g,%d,%d,%d,%d,%.9g\n", state->pressure_pa[report->loaded],
                 bend_of(report, state), hypot(state->curvature_x_1pm, state->curvature_y_1pm), state->stretch,
                 state->volume_m2[report->loaded] / report->rest_area_m2, state->width_bend_plane_m,
                 state->width_across_m, state->von_mises_apex_pa, state->stretch_max, state->stable,
-                state->elliptic, state->contact, state->beyond_strain);
+                state->elliptic, state->contact, state->beyond_strain, tip_bend_of(report, state));
     }
     if (!report->arguments->quiet && report->points % ROWS_SHOWN_EVERY == 0) {
         print_row(report, state);
@@ -205,7 +214,8 @@ static int solve(const struct arguments *arguments, const struct module_descript
     struct report report = {.arguments = arguments,
                             .solver = solver,
                             .csv = csv,
-                            .active_length_m = module->chamber_length_m + module->end_correction_m};
+                            .module = module,
+                            .active_length_m = module->chamber_length_m};
     struct description_error error;
     double direction_pa[3], value = 0.0;
     enum section_goal goal = SECTION_GOAL_PRESSURE;
@@ -220,14 +230,14 @@ static int solve(const struct arguments *arguments, const struct module_descript
     }
     if (csv != NULL) {
         fputs("pressure_pa,bend_rad,curvature_1pm,stretch,volume_ratio,width_bend_plane_m,width_across_m,"
-              "von_mises_apex_pa,stretch_max,stable,elliptic,contact,beyond_strain\n",
+              "von_mises_apex_pa,stretch_max,stable,elliptic,contact,beyond_strain,tip_bend_rad\n",
               csv);
     }
     if (!arguments->quiet) {
         cli_print_material(&module->material);
         printf("module    %s, %zu equations\n", module->name, section_solver_equations(solver));
-        printf("%10s %8s %8s %8s %9s %9s %11s %8s\n%10s %8s %8s %8s %9s %9s %11s %8s\n", "pressure", "bend", "stretch",
-               "volume", "in plane", "across", "von Mises", "greatest", "Pa", "deg", "", "ratio", "width mm", "width mm",
+        printf("%10s %8s %8s %8s %8s %9s %9s %11s %8s\n%10s %8s %8s %8s %8s %9s %9s %11s %8s\n", "pressure", "bend", "tip", "stretch",
+               "volume", "in plane", "across", "von Mises", "greatest", "Pa", "deg", "deg", "", "ratio", "width mm", "width mm",
                "apex kPa", "stretch");
     }
     for (int limit = 0; limit < LIMITS; limit++) {

@@ -38,6 +38,11 @@ struct caps_yaml {
     double distal_m;
 };
 
+struct end_correction_yaml {
+    double balloon_ratio;
+    double cap_rotation;
+};
+
 struct limits_yaml {
     double working_pressure_pa;
     double burst_pressure_pa;
@@ -51,7 +56,7 @@ struct module_yaml {
     double bore_diameter_m;
     double length_m;
     struct caps_yaml end_caps;
-    double end_correction_m;
+    struct end_correction_yaml end_correction;
     char *material;
     struct chamber_yaml *chambers;
     unsigned chambers_count;
@@ -95,6 +100,9 @@ static const cyaml_schema_value_t layer_schema = {
 static const cyaml_schema_field_t caps_fields[] = {
     CYAML_FIELD_FLOAT("proximal_m", CYAML_FLAG_DEFAULT, struct caps_yaml, proximal_m),
     CYAML_FIELD_FLOAT("distal_m", CYAML_FLAG_DEFAULT, struct caps_yaml, distal_m), CYAML_FIELD_END};
+static const cyaml_schema_field_t correction_fields[] = {
+    CYAML_FIELD_FLOAT("balloon_ratio", CYAML_FLAG_DEFAULT, struct end_correction_yaml, balloon_ratio),
+    CYAML_FIELD_FLOAT("cap_rotation", CYAML_FLAG_DEFAULT, struct end_correction_yaml, cap_rotation), CYAML_FIELD_END};
 static const cyaml_schema_field_t limits_fields[] = {
     CYAML_FIELD_FLOAT("working_pressure_pa", CYAML_FLAG_DEFAULT, struct limits_yaml, working_pressure_pa),
     CYAML_FIELD_FLOAT("burst_pressure_pa", CYAML_FLAG_DEFAULT, struct limits_yaml, burst_pressure_pa),
@@ -106,7 +114,7 @@ static const cyaml_schema_field_t module_fields[] = {
     CYAML_FIELD_FLOAT("bore_diameter_m", CYAML_FLAG_OPTIONAL, struct module_yaml, bore_diameter_m),
     CYAML_FIELD_FLOAT("length_m", CYAML_FLAG_DEFAULT, struct module_yaml, length_m),
     CYAML_FIELD_MAPPING("end_caps", CYAML_FLAG_DEFAULT, struct module_yaml, end_caps, caps_fields),
-    CYAML_FIELD_FLOAT("end_correction_m", CYAML_FLAG_OPTIONAL, struct module_yaml, end_correction_m),
+    CYAML_FIELD_MAPPING("end_correction", CYAML_FLAG_OPTIONAL, struct module_yaml, end_correction, correction_fields),
     CYAML_FIELD_STRING_PTR("material", CYAML_FLAG_POINTER, struct module_yaml, material, 1, MATERIAL_NAME_BYTES - 1),
     CYAML_FIELD_SEQUENCE("chambers", CYAML_FLAG_POINTER, struct module_yaml, chambers, &chamber_schema, 1,
                          MODULE_CHAMBERS),
@@ -225,10 +233,13 @@ static bool check_relations(const char *path, const struct module_yaml *yaml, st
                                 "caps of %g and %g m leave no chamber in a module of %g m", yaml->end_caps.proximal_m,
                                 yaml->end_caps.distal_m, yaml->length_m);
     }
-    const double chamber_m = yaml->length_m - yaml->end_caps.proximal_m - yaml->end_caps.distal_m;
-    if (!(fabs(yaml->end_correction_m) < 0.5 * chamber_m)) {
-        return yaml_file_reject(error, path, "end_correction_m", 1, "%g m is over half the chamber's length",
-                                yaml->end_correction_m);
+    if (!(yaml->end_correction.balloon_ratio >= 0.0 && yaml->end_correction.balloon_ratio <= 2.0)) {
+        return yaml_file_reject(error, path, "balloon_ratio", 1, "must be between 0 and 2, not %g",
+                                yaml->end_correction.balloon_ratio);
+    }
+    if (!(yaml->end_correction.cap_rotation >= 0.0 && yaml->end_correction.cap_rotation <= 1.0)) {
+        return yaml_file_reject(error, path, "cap_rotation", 1, "must be between 0 and 1, not %g",
+                                yaml->end_correction.cap_rotation);
     }
     if (!(yaml->limits.burst_pressure_pa > yaml->limits.working_pressure_pa)) {
         return yaml_file_reject(error, path, "burst_pressure_pa", 1,
@@ -250,7 +261,8 @@ static void take(const struct module_yaml *yaml, struct module_description *modu
     module->cap_proximal_m = yaml->end_caps.proximal_m;
     module->cap_distal_m = yaml->end_caps.distal_m;
     module->chamber_length_m = yaml->length_m - yaml->end_caps.proximal_m - yaml->end_caps.distal_m;
-    module->end_correction_m = yaml->end_correction_m;
+    module->end_correction =
+        (struct end_correction){yaml->end_correction.balloon_ratio, yaml->end_correction.cap_rotation};
     module->working_pressure_pa = yaml->limits.working_pressure_pa;
     module->burst_pressure_pa = yaml->limits.burst_pressure_pa;
     module->bend_limit_rad = yaml->limits.bend_deg * M_PI / 180.0;
@@ -388,7 +400,7 @@ unsigned long long module_description_hash(const struct module_description *modu
         hash = hash_byte(hash, (unsigned char)module->name[i]);
     }
     const double numbers[] = {module->outer_diameter_m,    module->bore_diameter_m,   module->length_m,
-                              module->chamber_length_m,    module->end_correction_m,  module->cap_proximal_m,
+                              module->chamber_length_m,    module->end_correction.balloon_ratio, module->end_correction.cap_rotation,  module->cap_proximal_m,
                               module->cap_distal_m,        module->working_pressure_pa, module->burst_pressure_pa,
                               module->bend_limit_rad,      (double)module->layer_count};
     hash = hash_material(hash_numbers(hash, numbers, sizeof numbers / sizeof numbers[0]), &module->material);

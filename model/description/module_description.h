@@ -30,13 +30,19 @@ struct module_layer {
     struct material corrugation;
 };
 
+/* Without dimension; see section/section_bend.h. */
+struct end_correction {
+    double balloon_ratio;
+    double cap_rotation;
+};
+
 struct module_description {
     char name[MODULE_NAME_BYTES];
     double outer_diameter_m;
     double bore_diameter_m; /* 0: solid */
     double length_m;
     double chamber_length_m;
-    double end_correction_m; /* added to the chamber length: bend = curvature * (chamber length + correction) */
+    struct end_correction end_correction;
     double cap_proximal_m;
     double cap_distal_m;
     char material_name[MATERIAL_NAME_BYTES];

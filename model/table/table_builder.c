@@ -10,6 +10,7 @@
 #include "control/bend_table.h"
 #include "control/bend_table_format.h"
 #include "program/output_file.h"
+#include "section/section_bend.h"
 #include "section/section_solver.h"
 #include "sweep/sweep.h"
 
@@ -74,9 +75,13 @@ static void tick(struct build *build, size_t count) {
     }
 }
 
-static void record(struct node *node, const struct section_state *state) {
+/* The table's curvature is the tip's bend over the chamber's length, ends included. */
+static void record(const struct build *build, struct node *node, const struct section_state *state) {
+    const double length_m = build->module->chamber_length_m;
+    double bend_rad[2];
+    section_tip_bend(build->module, state, bend_rad);
     const double values[BEND_TABLE_CHANNEL_COUNT] = {
-        state->curvature_x_1pm, state->curvature_y_1pm, state->stretch,     state->volume_m2[0], state->volume_m2[1],
+        bend_rad[0] / length_m, bend_rad[1] / length_m, state->stretch,     state->volume_m2[0], state->volume_m2[1],
         state->volume_m2[2],    state->von_mises_apex_pa, state->stretch_max, state->width_max_m};
     for (size_t c = 0; c < BEND_TABLE_CHANNEL_COUNT; c++) {
         node->value[c] = (float)values[c];
@@ -96,7 +101,7 @@ static bool solve_node(struct build *build, struct section_solver *solver, const
     const bool found = section_solver_move_to(solver, pressure_pa);
     section_solver_state(solver, &state);
     if (found) {
-        record(node, &state);
+        record(build, node, &state);
     }
     head->solved++;
     head->no_equilibrium += !found;
@@ -272,7 +277,7 @@ static void put_header(const struct build *build, struct table_image *image) {
     const uint64_t hash = module_description_hash(module);
     const float geometry[] = {(float)module->outer_diameter_m,
                               (float)module->chamber_length_m,
-                              (float)(module->chamber_length_m + module->end_correction_m),
+                              (float)module->chamber_length_m, /* bend = curvature x this */
                               (float)module->cap_proximal_m,
                               (float)module->cap_distal_m,
                               (float)module->working_pressure_pa,

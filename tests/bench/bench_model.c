@@ -68,7 +68,7 @@ int main(void) {
     section_solver_reset(solver);
     struct path_end end = {.points = 0};
     const double direction_pa[3] = {1.0, 0.0, 0.0};
-    const double curvature_1pm = acos(0.0) / (module.chamber_length_m + module.end_correction_m);
+    const double curvature_1pm = acos(0.0) / module.chamber_length_m;
     const double start_s = seconds();
     if (!section_solver_path(solver, direction_pa, SECTION_GOAL_CURVATURE, curvature_1pm, note_point, &end, &error)) {
         fail(&error);

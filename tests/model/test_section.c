@@ -358,7 +358,7 @@ static bool record_point(void *context, const struct section_state *state) {
 static struct path_record follow(struct fixture *fixture, double bend_deg) {
     const double direction_pa[3] = {1.0, 0.0, 0.0};
     struct description_error error;
-    struct path_record record = {.length_m = fixture->module.chamber_length_m + fixture->module.end_correction_m};
+    struct path_record record = {.length_m = fixture->module.chamber_length_m};
     section_solver_reset(fixture->solver);
     if (!section_solver_path(fixture->solver, direction_pa, SECTION_GOAL_CURVATURE, bend_deg / DEGREES / record.length_m,
                              record_point, &record, &error)) {

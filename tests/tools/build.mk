@@ -3,7 +3,7 @@
 JOBS := $(shell nproc 2>/dev/null || echo 1)
 
 BUILD_PACKAGES := gcc libc6-dev pkg-config libgmsh-dev libsuitesparse-dev libgsl-dev libcyaml-dev libyaml-dev \
-                  libopenmpi-dev openmpi-bin zlib1g-dev libcmocka-dev gnuplot-nox fonts-dejavu-core
+                  libopenmpi-dev openmpi-bin zlib1g-dev libcmocka-dev calculix-ccx gnuplot-nox fonts-dejavu-core
 LINT_PACKAGES  := clang clang-tidy cppcheck gcc-arm-none-eabi libnewlib-arm-none-eabi
 
 # --- sources: a folder is a layer; arrows between layers are include paths below
@@ -17,8 +17,9 @@ HOST_MAIN  := host/cli/main.c
 TEST_C     := $(wildcard tests/*/test_*.c)
 BENCH_C    := $(wildcard tests/bench/bench_*.c)
 SUPPORT_C  := $(filter-out $(TEST_C) $(BENCH_C),$(wildcard tests/*/*.c))
-ALL_C      := $(FIRMWARE_C) $(SIM_C) $(MODEL_C) $(TABLES_CLI_C) $(HOST_C) $(HOST_MAIN) $(TEST_C) $(BENCH_C) $(SUPPORT_C)
-ALL_H      := $(wildcard firmware/*.h firmware/*/*.h hal/*.h hal/*/*.h model/*/*.h host/*/*.h tests/*/*.h)
+SOLID_C    := $(wildcard tests/model/ccx/*.c)
+ALL_C      := $(FIRMWARE_C) $(SIM_C) $(MODEL_C) $(TABLES_CLI_C) $(HOST_C) $(HOST_MAIN) $(TEST_C) $(BENCH_C) $(SUPPORT_C) $(SOLID_C)
+ALL_H      := $(wildcard tests/model/ccx/*.h firmware/*.h firmware/*/*.h hal/*.h hal/*/*.h model/*/*.h host/*/*.h tests/*/*.h)
 
 # --- flags
 WARNINGS := -Wall -Wextra -Wpedantic -Wconversion -Wsign-conversion -Wshadow -Werror
@@ -75,7 +76,8 @@ bench-programs: $(BENCH_PROGRAMS)
 # Tests of the model link its libraries; the others link what `tribend` links.
 $(BUILD)/tests/model/test_%: $(BUILD)/tests/model/test_%.o $(SUPPORT_O) $(MODEL_O) $(FIRMWARE_O)
 	$(link) -lcmocka $(MODEL_LIBS)
-$(BUILD)/tests/bench/bench_model: $(BUILD)/tests/bench/bench_model.o $(MODEL_O) $(FIRMWARE_O)
+$(BUILD)/tests/model/test_solid $(BUILD)/tests/bench/bench_solid: $(call object,$(SOLID_C))
+$(BUILD)/tests/bench/bench_model $(BUILD)/tests/bench/bench_solid: %: %.o $(MODEL_O) $(FIRMWARE_O)
 	$(link) $(MODEL_LIBS)
 $(BUILD)/tests/%: $(BUILD)/tests/%.o $(SUPPORT_O) $(HOST_O) $(SIM_O) $(FIRMWARE_O) $(SHARED_O)
 	$(link) -lcmocka -lm
