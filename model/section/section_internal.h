@@ -36,6 +36,7 @@ struct section_solver {
     /* state */
     double *unknown;     /* [sparse_count + BORDERED] */
     double pressure[MODULE_CHAMBERS];
+    double force[GLOBALS]; /* on stretch and curvatures, over modulus x radius^2 and ^3 */
     bool stable;
     int iterations;
 

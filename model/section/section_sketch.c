@@ -189,7 +189,7 @@ double section_sketch_size(int dimension, int tag, double x, double y, double z,
         const double distance_m = i < plan->cavity_count ? cavity_outline_distance(&plan->cavity[i], point_m)
                                                          : fmax(0.0, radius_m - plan->bore_radius_m);
         cavity_m = fmin(cavity_m, distance_m);
-        corner_m = i < plan->cavity_count ? fmin(corner_m, corner_distance(&plan->cavity[i], point_m)) : corner_m;
+        corner_m = i < plan->cavity_count && !plan->plain_corners ? fmin(corner_m, corner_distance(&plan->cavity[i], point_m)) : corner_m;
         second_m = fmin(second_m, fmax(nearest_m, distance_m));
         nearest_m = fmin(nearest_m, distance_m);
     }

@@ -17,6 +17,7 @@ struct section_plan {
     double layer_inner_m[MODULE_LAYERS_MAX];
     double layer_outer_m[MODULE_LAYERS_MAX];
     double size_m; /* element edge at the cavities' walls */
+    bool plain_corners; /* no finer elements at the cavities' corners */
 };
 
 /* A drawing in gmsh's OpenCASCADE kernel; `failed` collects the errors of every call. */

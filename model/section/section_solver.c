@@ -326,23 +326,26 @@ void section_deformed_triangle(const struct section_solver *solver, size_t trian
 void section_solver_reset(struct section_solver *solver) {
     memset(solver->unknown, 0, equations(solver) * sizeof(double));
     memset(solver->pressure, 0, sizeof solver->pressure);
+    memset(solver->force, 0, sizeof solver->force);
     solver->unknown[solver->sparse_count] = 1.0;
     solver->stable = true;
     solver->iterations = 0;
 }
 
 size_t section_solver_unknowns(const struct section_solver *solver) {
-    return equations(solver) + MODULE_CHAMBERS;
+    return equations(solver) + MODULE_CHAMBERS + GLOBALS;
 }
 
 void section_solver_save(const struct section_solver *solver, double *values) {
     memcpy(values, solver->unknown, equations(solver) * sizeof(double));
     memcpy(values + equations(solver), solver->pressure, sizeof solver->pressure);
+    memcpy(values + equations(solver) + MODULE_CHAMBERS, solver->force, sizeof solver->force);
 }
 
 void section_solver_restore(struct section_solver *solver, const double *values) {
     memcpy(solver->unknown, values, equations(solver) * sizeof(double));
     memcpy(solver->pressure, values + equations(solver), sizeof solver->pressure);
+    memcpy(solver->force, values + equations(solver) + MODULE_CHAMBERS, sizeof solver->force);
 }
 
 double section_solver_chamber_area_m2(const struct section_solver *solver, size_t chamber) {
@@ -481,6 +484,9 @@ static bool assemble(struct section_solver *solver, const double direction[MODUL
         if (mesh->edge[e].hoop_stiffness_npm > 0.0) {
             scatter_fibres(solver, e, position);
         }
+    }
+    for (size_t m = 0; m < GLOBALS; m++) {
+        solver->residual[solver->sparse_count + m] -= solver->force[m];
     }
     const double multiplier = solver->unknown[solver->sparse_count + GLOBALS];
     for (size_t i = 0; i < solver->sparse_count; i++) {
@@ -652,18 +658,31 @@ static bool landed_near(struct section_solver *solver, const double *start) {
 }
 
 bool section_solver_move_to(struct section_solver *solver, const double pressure_pa[3]) {
+    static const struct section_load none = {0.0, {0.0, 0.0}};
+    return section_solver_move_to_loaded(solver, pressure_pa, &none);
+}
+
+bool section_solver_move_to_loaded(struct section_solver *solver, const double pressure_pa[3],
+                                   const struct section_load *load) {
     const size_t bytes = section_solver_unknowns(solver) * sizeof(double);
+    const double force_unit = solver->modulus_pa * solver->radius_m * solver->radius_m;
+    /* the reported curvature is (ky, -kx) of the section's globals */
+    const double force[GLOBALS] = {load->axial_n / force_unit, -load->moment_nm[1] / (force_unit * solver->radius_m),
+                                   load->moment_nm[0] / (force_unit * solver->radius_m)};
     double *origin = malloc(bytes), *start = malloc(bytes);
     bool reached = false;
     solver->iterations = 0;
     if (origin != NULL && start != NULL) {
         section_solver_save(solver, origin);
         double done = 0.0, step = 1.0;
-        const double *from = origin + equations(solver);
+        const double *from = origin + equations(solver), *force_from = from + MODULE_CHAMBERS;
         while (done < 1.0 && step >= SUBSTEP_LEAST) {
             section_solver_save(solver, start);
             for (size_t c = 0; c < MODULE_CHAMBERS; c++) {
                 solver->pressure[c] = from[c] + (done + step) * (pressure_pa[c] / solver->modulus_pa - from[c]);
+            }
+            for (size_t m = 0; m < GLOBALS; m++) {
+                solver->force[m] = force_from[m] + (done + step) * (force[m] - force_from[m]);
             }
             if (newton(solver) && solver->stable && landed_near(solver, start)) {
                 done += step;

@@ -54,6 +54,15 @@ void section_solver_free(struct section_solver *solver);
 /* Natural continuation from the present state to these pressures, steps cut as needed. False: no equilibrium was
  * reached (a fold, or loss of convergence); the solver is then back at its last converged state. */
 bool section_solver_move_to(struct section_solver *solver, const double pressure_pa[3]);
+/* Forces on the section from beyond its ends, as a rod passes them on. `moment_nm` is conjugate to the reported curvature:
+ * its vector points where it would move the tip. */
+struct section_load {
+    double axial_n;
+    double moment_nm[2];
+};
+/* The same with a load, which then stays until the next move or reset. */
+bool section_solver_move_to_loaded(struct section_solver *solver, const double pressure_pa[3],
+                                   const struct section_load *load);
 void section_solver_state(struct section_solver *solver, struct section_state *state);
 /* Undeformed again. */
 void section_solver_reset(struct section_solver *solver);

@@ -153,7 +153,7 @@ static double coarse_size(int dimension, int tag, double x, double y, double z, 
 }
 
 static bool mesh_plane(const struct module_description *module, double size_m, struct plane_mesh *plane) {
-    struct section_plan plan = {.outer_radius_m = 0.5 * module->outer_diameter_m, .size_m = size_m};
+    struct section_plan plan = {.outer_radius_m = 0.5 * module->outer_diameter_m, .size_m = size_m, .plain_corners = true};
     for (int c = 0; c < MODULE_CHAMBERS; c++) {
         for (size_t k = 0; k < module->chamber[c].cavity_count; k++) {
             plan.cavity[plan.cavity_count] = module->chamber[c].cavity[k];
