@@ -10,6 +10,7 @@
 /* Each returns an exit code. `argv[0]` is the name of the program with the subcommand. */
 int cli_solve(int argc, char **argv);
 int cli_build(int argc, char **argv);
+int cli_rod(int argc, char **argv);
 int cli_show(int argc, char **argv);
 int cli_plot(int argc, char **argv);
 int cli_fit(int argc, char **argv);

@@ -14,6 +14,7 @@
 static const struct program_subcommand subcommands[] = {
     {"solve", cli_solve, "follow a module's equilibria under pressure, up to a pressure or a bend"},
     {"build", cli_build, "build a module's bend table"},
+    {"rod", cli_rod, "find the tip under gravity, a payload and a force"},
     {"show", cli_show, "print what a bend table holds"},
     {"plot", cli_plot, "draw a bend table"},
     {"fit", cli_fit, "fit material laws to tensile tests"},

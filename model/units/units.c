@@ -15,10 +15,13 @@ static const struct unit units[] = {
     {UNITS_PRESSURE, "Pa", 1.0},     {UNITS_PRESSURE, "kPa", 1e3},       {UNITS_PRESSURE, "mbar", 1e2},
     {UNITS_PRESSURE, "bar", 1e5},    {UNITS_ANGLE, "deg", M_PI / 180.0}, {UNITS_ANGLE, "rad", 1.0},
     {UNITS_TIME, "s", 1.0},          {UNITS_TIME, "ms", 1e-3},           {UNITS_TIME, "min", 60.0},
-    {UNITS_LENGTH, "m", 1.0},        {UNITS_LENGTH, "mm", 1e-3},         {UNITS_LENGTH, "um", 1e-6}};
-static const char *const kind_name[] = {"a pressure", "an angle", "a time", "a length"};
-static const char *const kind_units[] = {"Pa, kPa, mbar or bar", "deg or rad", "s, ms or min", "m, mm or um"};
-static const char *const kind_example[] = {"40mbar", "60deg", "5s", "12mm"};
+    {UNITS_LENGTH, "m", 1.0},        {UNITS_LENGTH, "mm", 1e-3},         {UNITS_LENGTH, "um", 1e-6},
+    {UNITS_MASS, "kg", 1.0},         {UNITS_MASS, "g", 1e-3},         {UNITS_FORCE, "N", 1.0},
+    {UNITS_FORCE, "mN", 1e-3}};
+static const char *const kind_name[] = {"a pressure", "an angle", "a time", "a length", "a mass", "a force"};
+static const char *const kind_units[] = {"Pa, kPa, mbar or bar", "deg or rad", "s, ms or min", "m, mm or um", "kg or g",
+                                         "N or mN"};
+static const char *const kind_example[] = {"40mbar", "60deg", "5s", "12mm", "20g", "0.1N"};
 
 static const struct unit *find_unit(const char *suffix) {
     for (size_t i = 0; i < sizeof units / sizeof units[0]; i++) {

@@ -6,9 +6,9 @@
 #include <stdbool.h>
 #include <stddef.h>
 
-enum units_kind { UNITS_PRESSURE, UNITS_ANGLE, UNITS_TIME, UNITS_LENGTH };
+enum units_kind { UNITS_PRESSURE, UNITS_ANGLE, UNITS_TIME, UNITS_LENGTH, UNITS_MASS, UNITS_FORCE };
 
-/* To Pa, rad, s or m. */
+/* To Pa, rad, s, m, kg or N. */
 bool units_parse(enum units_kind kind, const char *text, double *value, char *error, size_t error_bytes);
 /* The kind whose unit the text carries; false: none of them. */
 bool units_kind_of(const char *text, enum units_kind *kind);

@@ -123,6 +123,11 @@ expect subcommand_missing 2 'Usage' "$tribend"
 expect tables_subcommand_unknown 2 "'dance'" "$tables" dance
 expect goal_without_unit 2 "'90' has no unit" "$tables" solve paper-semicircle --to 90
 expect chamber_unknown 2 'chambers' "$tables" solve paper-semicircle --chamber 4
+expect payload_without_unit 2 "'20' has no unit" "$tables" rod paper-semicircle 60mbar 0mbar 0mbar --payload 20
+expect rod_pressure_missing 2 'three pressures' "$tables" rod paper-semicircle 60mbar
+expect rod_overloaded 4 'load' "$tables" rod paper-semicircle 60mbar 0mbar 0mbar --payload 2kg --mount 180deg --csv "$scratch/out/rod.csv"
+expect study_unknown 2 'wall, length' "$tables" study colour
+expect run_without_columns 3 'p1_pa' "$tables" stiffness stiff-flop README.md
 expect law_option_unknown 2 'law' "$tables" fit "$scratch/run.csv" --law hooke
 expect tensile_file_wrong 3 'run.csv' "$tables" fit "$scratch/run.csv" --law yeoh
 
