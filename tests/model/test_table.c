@@ -65,8 +65,10 @@ static void the_table_says_what_the_solver_says(void **state) {
         section_solver_reset(solver);
         assert_true(section_solver_move_to(solver, pressure_pa));
         section_solver_state(solver, &solved);
-        assert_close((double)table.channel[BEND_TABLE_CURVATURE_X][at], solved.curvature_x_1pm, 1e-4);
-        assert_close((double)table.channel[BEND_TABLE_CURVATURE_Y][at], solved.curvature_y_1pm, 1e-4);
+        double bend_rad[2];
+        section_tip_bend(&module, &solved, bend_rad);
+        assert_close((double)table.channel[BEND_TABLE_CURVATURE_X][at], bend_rad[0] / module.chamber_length_m, 1e-4);
+        assert_close((double)table.channel[BEND_TABLE_CURVATURE_Y][at], bend_rad[1] / module.chamber_length_m, 1e-4);
         assert_relative((double)table.channel[BEND_TABLE_STRETCH][at], solved.stretch, 1e-6);
         for (size_t c = 0; c < 3; c++) {
             assert_relative((double)table.channel[(size_t)BEND_TABLE_VOLUME_1 + c][at], solved.volume_m2[c], 1e-5);
