@@ -300,3 +300,27 @@ bool bend_table_is_valid(const struct bend_table *table, const struct bend_table
     }
     return valid;
 }
+
+static bool holds_at(const struct bend_table *table, const float pressure_pa[3], float share) {
+    const float scaled_pa[3] = {share * pressure_pa[0], share * pressure_pa[1], share * pressure_pa[2]};
+    struct bend_table_stencil stencil;
+    bend_table_locate(table, scaled_pa, &stencil);
+    return bend_table_is_valid(table, &stencil);
+}
+
+bool bend_table_keep_valid(const struct bend_table *table, float pressure_pa[3]) {
+    if (holds_at(table, pressure_pa, 1.0f)) {
+        return true;
+    }
+    float low = 0.0f, step = 0.5f;
+    for (uint32_t i = 0; i < 10u; i++) {
+        if (holds_at(table, pressure_pa, low + step)) {
+            low += step;
+        }
+        step *= 0.5f;
+    }
+    for (uint32_t c = 0; c < 3u; c++) {
+        pressure_pa[c] *= low;
+    }
+    return false;
+}

@@ -104,5 +104,8 @@ float bend_table_gradient(const struct bend_table *table, const struct bend_tabl
                           enum bend_table_channel channel, float gradient[3]);
 /* All eight corners of the cell are valid and no pressure was clamped. */
 bool bend_table_is_valid(const struct bend_table *table, const struct bend_table_stencil *stencil);
+/* Scales the pressures towards none until the table holds there (a fold or touching walls end its domain), to 1/1024 of
+ * them; the table holds at no pressure. True: they were left as they are. */
+bool bend_table_keep_valid(const struct bend_table *table, float pressure_pa[3]);
 
 #endif

@@ -203,6 +203,22 @@ static void aim_at_bend(struct controller *controller) {
     }
 }
 
+/* Within the limits, and within the domain over which the table holds: beyond a fold the module would snap. */
+static void aim_at_pressures(struct controller *controller) {
+    struct controller_status *status = &controller->status;
+    status->inverse.flags = 0u;
+    for (uint32_t c = 0; c < 3u; c++) {
+        const float wanted_pa = controller->active.pressure_pa[c];
+        status->pressure_target_pa[c] = real_clamp(wanted_pa, 0.0f, controller->parameters.limits.working_pressure_pa);
+        if (wanted_pa < 0.0f || wanted_pa > controller->parameters.limits.working_pressure_pa) {
+            status->inverse.flags |= (uint32_t)BEND_INVERSE_LIMITED_PRESSURE;
+        }
+    }
+    if (controller->table != NULL && !bend_table_keep_valid(controller->table, status->pressure_target_pa)) {
+        status->inverse.flags |= (uint32_t)BEND_INVERSE_LIMITED_PRESSURE;
+    }
+}
+
 static void aim(struct controller *controller) {
     struct controller_status *status = &controller->status;
     if (!supervisor_valves_enabled(&controller->supervisor)) {
@@ -214,16 +230,8 @@ static void aim(struct controller *controller) {
         if (controller->targets_stale) {
             aim_at_bend(controller);
         }
-    } else {
-        status->inverse.flags = 0u;
-        for (uint32_t c = 0; c < 3u; c++) {
-            const float wanted_pa = controller->active.pressure_pa[c];
-            status->pressure_target_pa[c] =
-                real_clamp(wanted_pa, 0.0f, controller->parameters.limits.working_pressure_pa);
-            if (wanted_pa < 0.0f || wanted_pa > controller->parameters.limits.working_pressure_pa) {
-                status->inverse.flags |= (uint32_t)BEND_INVERSE_LIMITED_PRESSURE;
-            }
-        }
+    } else if (controller->targets_stale) {
+        aim_at_pressures(controller);
     }
     controller->targets_stale = false;
 }

@@ -135,6 +135,34 @@ static void pressures_outside_are_clamped_and_say_so(void **state) {
     assert_true(isfinite((double)bend_table_value(table, &outside, BEND_TABLE_STRETCH)));
 }
 
+/* Nodes beyond a fold are not valid: pressures are scaled back to the last cell that holds, along their own direction. */
+static void pressures_are_kept_inside_the_valid_domain(void **state) {
+    (void)state;
+    struct synthetic_table synthetic;
+    synthetic_table_create(&synthetic, 9, 8000.0, 1.0, synthetic_module);
+    const struct bend_table *table = &synthetic.table;
+    for (uint32_t i = 0; i < 9; i++) {
+        for (uint32_t j = 0; j < 9; j++) {
+            for (uint32_t k = 0; k < 9; k++) {
+                if (i + j + k > 9) { /* no equilibrium beyond a sum of 9 kPa */
+                    synthetic.image[(size_t)(table->tag - synthetic.image) + k + 9 * (j + 9 * i)] = 0;
+                }
+            }
+        }
+    }
+    float inside_pa[3] = {3100.0f, 2500.0f, 500.0f}, outside_pa[3] = {6000.0f, 6000.0f, 3000.0f};
+    assert_true(bend_table_keep_valid(table, inside_pa));
+    assert_float_equal(inside_pa[0], 3100.0f, 0.0f);
+    assert_false(bend_table_keep_valid(table, outside_pa));
+    struct bend_table_stencil stencil;
+    bend_table_locate(table, outside_pa, &stencil);
+    assert_true(bend_table_is_valid(table, &stencil));
+    assert_float_equal(outside_pa[0], outside_pa[1], 1e-3f);
+    assert_float_equal(outside_pa[0], 2.0f * outside_pa[2], 1e-3f);
+    assert_true(outside_pa[0] > 2500.0f); /* not further back than the cell demands */
+    synthetic_table_free(&synthetic);
+}
+
 static void every_truncation_is_refused(void **state) {
     const struct synthetic_table *synthetic = *state;
     struct bend_table table;
@@ -204,6 +232,7 @@ int main(void) {
         cmocka_unit_test(quadratics_are_reproduced_between_nodes),
         cmocka_unit_test(value_and_slope_are_continuous_across_cells),
         cmocka_unit_test_setup_teardown(pressures_outside_are_clamped_and_say_so, set_up, tear_down),
+        cmocka_unit_test(pressures_are_kept_inside_the_valid_domain),
         cmocka_unit_test_setup_teardown(every_truncation_is_refused, set_up, tear_down),
         cmocka_unit_test_setup_teardown(every_flipped_bit_is_refused, set_up, tear_down),
         cmocka_unit_test_setup_teardown(each_kind_of_nonsense_has_its_own_answer, set_up, tear_down),
