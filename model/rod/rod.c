@@ -167,7 +167,7 @@ static void report(const struct module_description *module, const struct section
 
 bool rod_solve(const struct module_description *module, struct section_solver *solver, const struct rod_load *load,
                size_t stations, struct rod_state *state, struct description_error *error) {
-    struct strain strain[ROD_STATIONS_MAX], gap[ROD_STATIONS_MAX], last[ROD_STATIONS_MAX];
+    struct strain strain[ROD_STATIONS_MAX], gap[ROD_STATIONS_MAX], last[ROD_STATIONS_MAX] = {{{0.0}}};
     struct section_load section[ROD_STATIONS_MAX];
     struct frame frame[ROD_STATIONS_MAX];
     const struct section_load none = {0.0, {0.0, 0.0}};
