@@ -246,16 +246,47 @@ static void turn_node(const struct node *solved, const size_t order[3], struct n
     }
 }
 
-/* A node without an equilibrium takes the values of the nearest one below it along the diagonal. */
-static struct node fill_node(const struct build *build, size_t i, size_t j, size_t k) {
-    while (node_at(build, i, j, k)->tag == 0 && i > 0) {
-        i -= 1;
-        j -= j > 0;
-        k -= k > 0;
+static void grow_volumes(const struct build *build, size_t i, size_t j, size_t k, struct node *node) {
+    const struct node *below = node_at(build, i, j, k);
+    for (size_t c = 0; c < 3; c++) {
+        node->value[BEND_TABLE_VOLUME_1 + c] = fmaxf(node->value[BEND_TABLE_VOLUME_1 + c], below->value[BEND_TABLE_VOLUME_1 + c]);
     }
-    struct node filled = *node_at(build, i, j, k);
+}
+
+/* A node without an equilibrium takes the values of the nearest one below it along the diagonal, which has its symmetry;
+ * its volumes are no less than those of any node below it, so that a chamber never shrinks as its pressure rises. */
+static void fill_node(const struct build *build, size_t i, size_t j, size_t k) {
+    struct node filled = *node_at(build, i - 1, j - (j > 0), k - (k > 0));
+    float *volume = &filled.value[BEND_TABLE_VOLUME_1];
     filled.tag = BEND_TABLE_TAG_EXTRAPOLATED;
-    return filled;
+    if (i > j) {
+        grow_volumes(build, i - 1, j, k, &filled);
+    }
+    if (j > k) {
+        grow_volumes(build, i, j - 1, k, &filled);
+    }
+    if (k > 0) {
+        grow_volumes(build, i, j, k - 1, &filled);
+    }
+    if (i == j) { /* chambers under the same pressure are alike */
+        volume[0] = volume[1] = fmaxf(volume[0], volume[1]);
+    }
+    if (j == k) {
+        volume[1] = volume[2] = fmaxf(volume[1], volume[2]);
+    }
+    *node_at(build, i, j, k) = filled;
+}
+
+static void fill_nodes(const struct build *build) {
+    for (size_t i = 1; i < build->n; i++) {
+        for (size_t j = 0; j <= i; j++) {
+            for (size_t k = 0; k <= j; k++) {
+                if (node_at(build, i, j, k)->tag == 0) {
+                    fill_node(build, i, j, k);
+                }
+            }
+        }
+    }
 }
 
 static void put(unsigned char *image, size_t offset, const void *bytes, size_t size) {
@@ -306,18 +337,13 @@ static void put_nodes(const struct build *build, struct table_image *image) {
         const float pressure_pa = (float)build->axis_pa[i % n];
         put(axes, i * sizeof(float), &pressure_pa, sizeof pressure_pa);
     }
-    for (size_t at = 0; at < count; at++) {
+    for (size_t at = 0; at < count && n > 0; at++) {
         const size_t index[3] = {at / (n * n), at / n % n, at % n};
         size_t order[3];
         sort_chambers(index, order);
         const size_t i = index[order[0]], j = index[order[1]], k = index[order[2]];
-        struct node filled, turned;
-        const struct node *solved = node_at(build, i, j, k);
-        if (solved->tag == 0) {
-            filled = fill_node(build, i, j, k);
-            solved = &filled;
-        }
-        turn_node(solved, order, &turned);
+        struct node turned;
+        turn_node(node_at(build, i, j, k), order, &turned);
         for (size_t c = 0; c < BEND_TABLE_CHANNEL_COUNT; c++) {
             put(channels, (c * count + at) * sizeof(float), &turned.value[c], sizeof(float));
         }
@@ -333,6 +359,7 @@ static bool make_image(const struct build *build, struct table_image *image) {
     if (image->bytes == NULL) {
         return false;
     }
+    fill_nodes(build);
     put_header(build, image);
     put_nodes(build, image);
     const size_t covered = BEND_TABLE_OFFSET_CRC + 4;
