@@ -1,0 +1,33 @@
+#!/bin/bash
+# A rubber whose module snaps: the table ends before the fold, and commands beyond are answered at its edge, with a warning,
+# no fault and no snap.
+build=${TRIBEND_BUILD:-build}
+scratch=$(mktemp -d)
+trap 'rm -rf "$scratch"' EXIT
+table=$scratch/fold.tbt
+passed=0 failed=0
+"$build/tribend-tables" build paper-semicircle --material ecoflex-0030-measured-ogden --nodes 9 --mesh-size 1.5mm -q -o "$table" >"$scratch/said" || cat "$scratch/said"
+
+# check NAME WORDS command...: exit code 0, and the words in what it says
+check() {
+    local name=$1 words=$2
+    shift 2
+    echo "[ RUN      ] $name"
+    if "$@" >"$scratch/said" 2>&1 && grep -qE "$words" "$scratch/said"; then
+        echo "[       OK ] $name"
+        passed=$((passed + 1))
+    else
+        cat "$scratch/said"
+        echo "[  FAILED  ] $name"
+        failed=$((failed + 1))
+    fi
+}
+check table_has_an_edge '[1-9][0-9]* without an equilibrium' "$build/tribend-tables" show "$table"
+check bend_inside 'warnings +none' "$build/tribend" bend 8deg --for 3s -q --table "$table"
+for toward in 0 30 75 180; do
+    check "bend_beyond_toward_$toward" 'out of reach' "$build/tribend" bend 60deg --toward "${toward}deg" --for 3s -q --table "$table"
+done
+check pressure_beyond 'out of reach' "$build/tribend" pressure 100mbar 0mbar 0mbar --for 3s -q --table "$table"
+check pressures_beyond 'out of reach' "$build/tribend" pressure 100mbar 100mbar 50mbar --for 3s -q --table "$table"
+echo "[  PASSED  ] $passed test(s)."
+[ "$failed" -eq 0 ]
