@@ -52,22 +52,25 @@ static enum bend_table_status check_frame(const uint8_t *image, size_t size) {
     return BEND_TABLE_OK;
 }
 
-static enum bend_table_status bind_arrays(struct bend_table *table, const uint8_t *image, size_t size) {
+/* Nodes and bytes of the grid whose node counts stand at `offset`. */
+static enum bend_table_status measure_grid(struct bend_table *table, const uint8_t *image, size_t offset) {
     size_t nodes = 1, axis_nodes = 0;
     for (size_t a = 0; a < 3; a++) {
-        table->nodes[a] = read_u32(image, BEND_TABLE_OFFSET_NODES + 4u * a);
+        table->nodes[a] = read_u32(image, offset + 4u * a);
         if (table->nodes[a] < AXIS_NODES_LEAST || table->nodes[a] > BEND_TABLE_AXIS_NODES_MAX) {
             return BEND_TABLE_BAD_AXIS;
         }
         nodes *= table->nodes[a];
         axis_nodes += table->nodes[a];
     }
-    const size_t used =
-        BEND_TABLE_HEADER_BYTES + sizeof(float) * (axis_nodes + BEND_TABLE_CHANNEL_COUNT * nodes) + nodes;
-    if (read_u32(image, BEND_TABLE_OFFSET_CHANNELS) != BEND_TABLE_CHANNEL_COUNT || size != (used + 3u) / 4u * 4u) {
-        return BEND_TABLE_BAD_SIZE;
-    }
-    const float *next = (const float *)(const void *)(image + BEND_TABLE_HEADER_BYTES);
+    const size_t used = sizeof(float) * (axis_nodes + BEND_TABLE_CHANNEL_COUNT * nodes) + nodes;
+    table->grid_bytes = (uint32_t)((used + 3u) / 4u * 4u);
+    return BEND_TABLE_OK;
+}
+
+static enum bend_table_status bind_grid(struct bend_table *table, const uint8_t *grid) {
+    const size_t nodes = (size_t)table->nodes[0] * table->nodes[1] * table->nodes[2];
+    const float *next = (const float *)(const void *)grid;
     for (size_t a = 0; a < 3; a++) {
         table->axis_pa[a] = next;
         next += table->nodes[a];
@@ -82,18 +85,16 @@ static enum bend_table_status bind_arrays(struct bend_table *table, const uint8_
         next += nodes;
     }
     table->tag = (const uint8_t *)(const void *)next;
-    table->image = image;
-    table->image_bytes = (uint32_t)size;
-    table->image_crc = read_u32(image, BEND_TABLE_OFFSET_CRC);
     return BEND_TABLE_OK;
 }
 
 static enum bend_table_status read_module(struct bend_table *table, const uint8_t *image) {
     struct bend_table_module *module = &table->module;
-    float geometry[8];
+    float geometry[8], jumps[2];
     (void)memcpy(module->name, image + BEND_TABLE_OFFSET_NAME, BEND_TABLE_NAME_BYTES);
     (void)memcpy(&module->inputs_hash, image + BEND_TABLE_OFFSET_HASH, sizeof module->inputs_hash);
     (void)memcpy(geometry, image + BEND_TABLE_OFFSET_GEOMETRY, sizeof geometry);
+    (void)memcpy(jumps, image + BEND_TABLE_OFFSET_JUMPS, sizeof jumps);
     module->outer_diameter_m = geometry[0];
     module->chamber_length_m = geometry[1];
     module->active_length_m = geometry[2];
@@ -102,7 +103,10 @@ static enum bend_table_status read_module(struct bend_table *table, const uint8_
     module->working_pressure_pa = geometry[5];
     module->burst_pressure_pa = geometry[6];
     module->bend_limit_rad = geometry[7];
-    bool sound = module->name[BEND_TABLE_NAME_BYTES - 1u] == '\0';
+    module->jump_up_pa = jumps[0];
+    module->jump_down_pa = jumps[1];
+    bool sound = is_finite(jumps[0]) && jumps[1] >= 0.0f && jumps[1] <= jumps[0] &&
+                 module->name[BEND_TABLE_NAME_BYTES - 1u] == '\0';
     for (size_t i = 0; i < 8; i++) {
         const bool may_be_zero = i == 3 || i == 4;
         sound = sound && is_finite(geometry[i]) && (geometry[i] > 0.0f || (may_be_zero && geometry[i] == 0.0f));
@@ -115,7 +119,7 @@ static enum bend_table_status read_module(struct bend_table *table, const uint8_
 static enum bend_table_status weigh_slopes(struct bend_table *table, size_t a) {
     const float *x = table->axis_pa[a];
     const size_t n = table->nodes[a];
-    if (x[0] != 0.0f) {
+    if (!is_finite(x[0])) {
         return BEND_TABLE_BAD_AXIS;
     }
     for (size_t i = 0; i + 1 < n; i++) {
@@ -133,6 +137,75 @@ static enum bend_table_status weigh_slopes(struct bend_table *table, size_t a) {
     return BEND_TABLE_OK;
 }
 
+static enum bend_table_status bind_axes(struct bend_table *table, bool volume_first) {
+    enum bend_table_status status = BEND_TABLE_OK;
+    for (size_t a = 0; a < 3 && status == BEND_TABLE_OK; a++) {
+        const bool is_volume = volume_first && a == 0;
+        if (is_volume ? !(table->axis_pa[a][0] > 0.0f) : table->axis_pa[a][0] != 0.0f) {
+            return BEND_TABLE_BAD_AXIS;
+        }
+        status = weigh_slopes(table, a);
+    }
+    return status;
+}
+
+/* The grid at `start` of the image, whose node counts stand at `offset`; it must lie inside the image. */
+static enum bend_table_status read_grid(struct bend_table *table, const uint8_t *image, size_t size, size_t offset,
+                                        size_t start) {
+    enum bend_table_status status = measure_grid(table, image, offset);
+    if (status == BEND_TABLE_OK && (start > size || table->grid_bytes > size - start)) {
+        status = BEND_TABLE_BAD_SIZE;
+    }
+    if (status == BEND_TABLE_OK) {
+        status = bind_grid(table, image + start);
+    }
+    if (status == BEND_TABLE_OK) {
+        status = bind_axes(table, offset == BEND_TABLE_OFFSET_BALLOONED);
+    }
+    return status;
+}
+
+static bool has_ballooned(const uint8_t *image) {
+    return read_u32(image, BEND_TABLE_OFFSET_BALLOONED) != 0u;
+}
+
+/* Every byte of the image belongs to the header or to a grid. */
+static enum bend_table_status check_sizes(struct bend_table *table, const uint8_t *image, size_t size) {
+    size_t used = BEND_TABLE_HEADER_BYTES;
+    if (read_u32(image, BEND_TABLE_OFFSET_CHANNELS) != BEND_TABLE_CHANNEL_COUNT) {
+        return BEND_TABLE_BAD_SIZE;
+    }
+    enum bend_table_status status = measure_grid(table, image, BEND_TABLE_OFFSET_NODES);
+    used += table->grid_bytes;
+    if (status == BEND_TABLE_OK && has_ballooned(image)) {
+        status = measure_grid(table, image, BEND_TABLE_OFFSET_BALLOONED);
+        used += table->grid_bytes;
+    }
+    return status == BEND_TABLE_OK && used != size ? BEND_TABLE_BAD_SIZE : status;
+}
+
+static enum bend_table_status read_grids(struct bend_table *table, const uint8_t *image, size_t size) {
+    enum bend_table_status status = check_sizes(table, image, size);
+    if (status == BEND_TABLE_OK) {
+        status = read_grid(table, image, size, BEND_TABLE_OFFSET_NODES, BEND_TABLE_HEADER_BYTES);
+    }
+    if (status == BEND_TABLE_OK && has_ballooned(image)) {
+        /* checked in the same view, which is then bound to its own grid again */
+        status = read_grid(table, image, size, BEND_TABLE_OFFSET_BALLOONED,
+                           BEND_TABLE_HEADER_BYTES + (size_t)table->grid_bytes);
+        if (status == BEND_TABLE_OK) {
+            status = read_grid(table, image, size, BEND_TABLE_OFFSET_NODES, BEND_TABLE_HEADER_BYTES);
+        }
+        if (status == BEND_TABLE_OK && !(table->module.jump_up_pa > 0.0f)) {
+            status = BEND_TABLE_BAD_VALUE;
+        }
+    }
+    table->image = image;
+    table->image_bytes = (uint32_t)size;
+    table->image_crc = read_u32(image, BEND_TABLE_OFFSET_CRC);
+    return status;
+}
+
 enum bend_table_status bend_table_open(struct bend_table *table, const void *image, size_t size,
                                        const char *module_name) {
     (void)memset(table, 0, sizeof *table);
@@ -147,16 +220,20 @@ enum bend_table_status bend_table_open(struct bend_table *table, const void *ima
         status = read_module(table, image);
     }
     if (status == BEND_TABLE_OK) {
-        status = bind_arrays(table, image, size);
-    }
-    for (size_t a = 0; a < 3 && status == BEND_TABLE_OK; a++) {
-        status = weigh_slopes(table, a);
+        status = read_grids(table, image, size);
     }
     if (status == BEND_TABLE_OK && module_name != NULL &&
         strncmp(module_name, table->module.name, BEND_TABLE_NAME_BYTES) != 0) {
         status = BEND_TABLE_WRONG_MODULE;
     }
     return status;
+}
+
+bool bend_table_ballooned(const struct bend_table *table, struct bend_table *ballooned) {
+    *ballooned = *table;
+    return has_ballooned(table->image) &&
+           read_grid(ballooned, table->image, table->image_bytes, BEND_TABLE_OFFSET_BALLOONED,
+                     BEND_TABLE_HEADER_BYTES + (size_t)table->grid_bytes) == BEND_TABLE_OK;
 }
 
 const char *bend_table_status_text(enum bend_table_status status) {

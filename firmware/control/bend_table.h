@@ -29,6 +29,8 @@ enum bend_table_channel {
     BEND_TABLE_CHANNEL_COUNT
 };
 
+#define BEND_TABLE_PRESSURE_1 BEND_TABLE_VOLUME_1 /* in the ballooned table, Pa */
+
 /* Tag of a node, bits. A cell is usable where all eight corners are valid. */
 enum bend_table_tag {
     BEND_TABLE_TAG_VALID = 1u << 0,          /* equilibrium found, stable, inside the module's limits' margin */
@@ -52,7 +54,11 @@ enum bend_table_status {
     BEND_TABLE_MISALIGNED
 };
 
-/* Geometry and limits that the table carries for controller and plant. */
+/* Geometry and limits that the table carries for controller and plant.
+ *
+ * jump_up_pa: a module whose rubber softens has a greatest pressure of one chamber alone; there the chamber balloons at
+ * once, and it falls back at jump_down_pa. The table's axes end before jump_up_pa; what lies beyond is in the ballooned
+ * grid (bend_table_ballooned()). Control never goes there. */
 struct bend_table_module {
     char name[BEND_TABLE_NAME_BYTES];
     uint64_t inputs_hash;
@@ -64,6 +70,8 @@ struct bend_table_module {
     float working_pressure_pa;    /* greatest commanded pressure of one chamber */
     float burst_pressure_pa;
     float bend_limit_rad;         /* greatest commanded bend */
+    float jump_up_pa;             /* 0: no snap up to the end of the axes */
+    float jump_down_pa;           /* 0: no second stable branch was found */
 };
 
 struct bend_table {
@@ -72,6 +80,7 @@ struct bend_table {
     const float *axis_pa[3];  /* strictly rising, first 0 */
     const float *channel[BEND_TABLE_CHANNEL_COUNT]; /* [i3 + nodes[2] * (i2 + nodes[1] * i1)] */
     const uint8_t *tag;
+    uint32_t grid_bytes;  /* axes, channels, tags and padding */
     const uint8_t *image; /* as a whole, to be checked again while running */
     uint32_t image_bytes;
     uint32_t image_crc;
@@ -92,6 +101,11 @@ struct bend_table_stencil {
  * Anything but BEND_TABLE_OK leaves `table` unusable. */
 enum bend_table_status bend_table_open(struct bend_table *table, const void *image, size_t size,
                                        const char *module_name);
+/* The states of one chamber that has ballooned, both the unstable ones and those of the second stable branch, as a table
+ * of its own: axis 1 is that chamber's volume (m2, first above 0) in place of its pressure, and BEND_TABLE_PRESSURE_1 its
+ * pressure in place of its volume. For chamber 2 or 3, turn by one or two thirds and shift the pressures alike.
+ * `table` is one that bend_table_open() accepted; false: it has no such states. */
+bool bend_table_ballooned(const struct bend_table *table, struct bend_table *ballooned);
 /* A sentence for people, never NULL. */
 const char *bend_table_status_text(enum bend_table_status status);
 

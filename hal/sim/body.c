@@ -2,17 +2,15 @@
 
 #include <math.h>
 
-#include "sim/chamber.h"
-
 #define STRAIGHT_RAD 1e-9
 
-void body_shape_at(const struct bend_table *table, const double pressure_pa[3], struct body_shape *shape) {
+void body_shape_of(const struct bend_table *table, const struct chambers *chambers, struct body_shape *shape) {
     const double length_m = (double)table->module.active_length_m;
-    struct table_point point;
-    table_point_at(&point, table, pressure_pa);
-    shape->bend_x_rad = length_m * table_point_value(&point, BEND_TABLE_CURVATURE_X, NULL);
-    shape->bend_y_rad = length_m * table_point_value(&point, BEND_TABLE_CURVATURE_Y, NULL);
-    shape->stretch = table_point_value(&point, BEND_TABLE_STRETCH, NULL);
+    double curvature_1pm[2];
+    chambers_curvature(chambers, table, curvature_1pm);
+    shape->bend_x_rad = length_m * curvature_1pm[0];
+    shape->bend_y_rad = length_m * curvature_1pm[1];
+    shape->stretch = chambers_stretch(chambers, table);
 }
 
 void body_tip_pose(const struct bend_table_module *module, const struct body_shape *shape, struct tip_pose *pose) {

@@ -3,7 +3,7 @@
 #ifndef TRIBEND_SIM_BODY_H
 #define TRIBEND_SIM_BODY_H
 
-#include "control/bend_table.h"
+#include "sim/chamber.h"
 
 struct body_shape {
     double bend_x_rad; /* bend vector: bend times the unit vector of the direction in which the tip moves */
@@ -16,8 +16,7 @@ struct tip_pose {
     double quaternion[4]; /* w, x, y, z */
 };
 
-/* Shape at these pressures. */
-void body_shape_at(const struct bend_table *table, const double pressure_pa[3], struct body_shape *shape);
+void body_shape_of(const struct bend_table *table, const struct chambers *chambers, struct body_shape *shape);
 /* Pose of the tip face's centre. */
 void body_tip_pose(const struct bend_table_module *module, const struct body_shape *shape, struct tip_pose *pose);
 

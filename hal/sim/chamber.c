@@ -7,8 +7,8 @@ void table_point_at(struct table_point *point, const struct bend_table *table, c
     float inside[3];
     point->table = table;
     for (size_t a = 0; a < 3; a++) {
-        const double end = (double)table->axis_pa[a][table->nodes[a] - 1];
-        inside[a] = (float)fmin(fmax(pressure_pa[a], 0.0), end);
+        const double start = (double)table->axis_pa[a][0], end = (double)table->axis_pa[a][table->nodes[a] - 1];
+        inside[a] = (float)fmin(fmax(pressure_pa[a], start), end);
         point->beyond_pa[a] = pressure_pa[a] - (double)inside[a];
     }
     bend_table_locate(table, inside, &point->stencil);
@@ -38,30 +38,126 @@ double gas_mass_flow(const struct gas_parameters *parameters, double conductance
     return ratio <= b ? choked : choked * sqrt(1.0 - share * share);
 }
 
-/* Volumes and capacities at the present pressures. */
+static enum bend_table_channel volume_channel(size_t chamber) {
+    return (enum bend_table_channel)((size_t)BEND_TABLE_VOLUME_1 + chamber);
+}
+
+/* The state in the grid that knows it, whose first axis is chamber `first` (0 where none has ballooned). */
+static size_t point_of(const struct chambers *chambers, const struct bend_table *table, struct table_point *point) {
+    const bool beyond = chambers->ballooned != CHAMBERS_NONE;
+    const size_t first = beyond ? chambers->ballooned : 0;
+    double at[3];
+    for (size_t a = 0; a < 3; a++) {
+        at[a] = chambers->coordinate[(first + a) % 3];
+    }
+    table_point_at(point, beyond ? &chambers->beyond : table, at);
+    return first;
+}
+
+/* Pressures, volumes and capacities at the present coordinates. */
 static void look_up(struct chambers *chambers, const struct gas_parameters *parameters,
                     const struct bend_table *table) {
     const double length_m = (double)table->module.chamber_length_m;
     struct table_point point;
-    table_point_at(&point, table, chambers->pressure_pa);
-    for (size_t c = 0; c < 3; c++) {
+    const size_t first = point_of(chambers, table, &point);
+    for (size_t a = 0; a < 3; a++) {
+        const size_t c = (first + a) % 3;
+        const bool by_volume = c == chambers->ballooned;
         double gradient[3];
-        const enum bend_table_channel channel = (enum bend_table_channel)((size_t)BEND_TABLE_VOLUME_1 + c);
-        const double volume_m2 = table_point_value(&point, channel, gradient);
-        const double pressure_pa_abs = parameters->ambient_pa_abs + chambers->pressure_pa[c];
+        const double value = table_point_value(&point, volume_channel(a), gradient);
+        const double volume_m2 = by_volume ? chambers->coordinate[c] : value;
+        chambers->pressure_pa[c] = by_volume ? value : chambers->coordinate[c];
         chambers->volume_m3[c] = parameters->tube_volume_m3 + length_m * volume_m2;
+        chambers->own_slope[c] = by_volume ? gradient[a] : 1.0;
+        const double pressure_pa_abs = parameters->ambient_pa_abs + chambers->pressure_pa[c];
         for (size_t d = 0; d < 3; d++) {
-            chambers->capacity[c][d] = pressure_pa_abs * length_m * gradient[d];
+            /* a gradient is one of the pressure or of the volume: the other is the coordinate */
+            chambers->capacity[c][(first + d) % 3] =
+                by_volume ? chambers->volume_m3[c] * gradient[d] : pressure_pa_abs * length_m * gradient[d];
         }
-        chambers->capacity[c][c] = fmax(chambers->capacity[c][c], 0.0) + chambers->volume_m3[c];
+        if (by_volume) {
+            chambers->capacity[c][c] += pressure_pa_abs * length_m;
+        } else {
+            chambers->capacity[c][c] = fmax(chambers->capacity[c][c], 0.0) + chambers->volume_m3[c];
+        }
     }
+}
+
+void chambers_curvature(const struct chambers *chambers, const struct bend_table *table, double curvature_1pm[2]) {
+    struct table_point point;
+    const double turn = 2.0 * M_PI / 3.0 * (double)point_of(chambers, table, &point);
+    const double x = table_point_value(&point, BEND_TABLE_CURVATURE_X, NULL);
+    const double y = table_point_value(&point, BEND_TABLE_CURVATURE_Y, NULL);
+    curvature_1pm[0] = x * cos(turn) - y * sin(turn);
+    curvature_1pm[1] = x * sin(turn) + y * cos(turn);
+}
+
+double chambers_stretch(const struct chambers *chambers, const struct bend_table *table) {
+    struct table_point point;
+    (void)point_of(chambers, table, &point);
+    return table_point_value(&point, BEND_TABLE_STRETCH, NULL);
 }
 
 void chambers_init(struct chambers *chambers, const struct gas_parameters *parameters, const struct bend_table *table) {
     memset(chambers, 0, sizeof *chambers);
+    chambers->ballooned = CHAMBERS_NONE;
+    chambers->snaps = bend_table_ballooned(table, &chambers->beyond);
     look_up(chambers, parameters, table);
     for (size_t c = 0; c < 3; c++) {
         chambers->gas[c] = parameters->ambient_pa_abs * chambers->volume_m3[c];
+    }
+}
+
+/* 3 x 3 by Cramer's rule; the matrix is near diagonal in units of its own and never singular. */
+static void solve3(double a[3][3], const double b[3], double x[3]) {
+    const double minor0 = a[1][1] * a[2][2] - a[1][2] * a[2][1];
+    const double minor1 = a[1][2] * a[2][0] - a[1][0] * a[2][2];
+    const double minor2 = a[1][0] * a[2][1] - a[1][1] * a[2][0];
+    const double determinant = a[0][0] * minor0 + a[0][1] * minor1 + a[0][2] * minor2;
+    x[0] = (b[0] * minor0 + a[0][1] * (a[1][2] * b[2] - b[1] * a[2][2]) + a[0][2] * (b[1] * a[2][1] - a[1][1] * b[2])) /
+           determinant;
+    x[1] = (a[0][0] * (b[1] * a[2][2] - a[1][2] * b[2]) + b[0] * minor1 + a[0][2] * (a[1][0] * b[2] - b[1] * a[2][0])) /
+           determinant;
+    x[2] = (a[0][0] * (a[1][1] * b[2] - b[1] * a[2][1]) + a[0][1] * (b[1] * a[2][0] - a[1][0] * b[2]) + b[0] * minor2) /
+           determinant;
+}
+
+/* Coordinates from the gas, one Newton step. */
+static void meet_gas(struct chambers *chambers, const struct gas_parameters *parameters) {
+    double step[3], gap[3];
+    for (size_t c = 0; c < 3; c++) {
+        gap[c] = chambers->gas[c] - (parameters->ambient_pa_abs + chambers->pressure_pa[c]) * chambers->volume_m3[c];
+    }
+    solve3(chambers->capacity, gap, step);
+    for (size_t c = 0; c < 3; c++) {
+        chambers->coordinate[c] += step[c];
+    }
+}
+
+/* Both grids know the states between the first two volumes of the ballooned one: the change is made there, at either end,
+ * and the gas stays what it was. */
+static void choose_grid(struct chambers *chambers, const struct gas_parameters *parameters,
+                        const struct bend_table *table) {
+    const double length_m = (double)table->module.chamber_length_m;
+    const uint32_t before = chambers->ballooned;
+    if (before == CHAMBERS_NONE) {
+        uint32_t largest = 0;
+        for (uint32_t c = 1; c < 3; c++) {
+            largest = chambers->volume_m3[c] > chambers->volume_m3[largest] ? c : largest;
+        }
+        const double volume_m2 = (chambers->volume_m3[largest] - parameters->tube_volume_m3) / length_m;
+        if (volume_m2 > (double)chambers->beyond.axis_pa[0][1]) {
+            chambers->ballooned = largest;
+            chambers->coordinate[largest] = volume_m2;
+        }
+    } else if (chambers->coordinate[before] < (double)chambers->beyond.axis_pa[0][0]) {
+        chambers->ballooned = CHAMBERS_NONE;
+        chambers->coordinate[before] = chambers->pressure_pa[before];
+    }
+    if (chambers->ballooned != before) {
+        look_up(chambers, parameters, table);
+        meet_gas(chambers, parameters);
+        look_up(chambers, parameters, table);
     }
 }
 
@@ -70,7 +166,7 @@ struct port {
     double conductance;
     double leak_conductance;
     double supply_pa_abs; /* ambient while the shut-off valve is shut */
-    double capacity_m3;
+    double slope; /* of the pressure by the gas, 1/m3 */
     bool supply_open;
 };
 
@@ -89,29 +185,15 @@ static double gas_rate(const struct port *port, bool fills, double chamber_pa_ab
 
 /* One stretch of time with the valve at rest, by the midpoint rule; pressure moves by the chamber's own capacity. */
 static void integrate(const struct port *port, bool fills, double duration_s, double *gas, double *pressure_pa_abs) {
-    const double half = 0.5 * duration_s / port->capacity_m3;
+    const double half = 0.5 * duration_s * port->slope;
     const double start = gas_rate(port, fills, *pressure_pa_abs);
     const double middle = gas_rate(port, fills, fmax(*pressure_pa_abs + half * start, 0.0));
     *gas += duration_s * middle;
-    *pressure_pa_abs += duration_s * middle / port->capacity_m3;
-    if (!fills && *pressure_pa_abs < port->parameters->ambient_pa_abs) {
-        *gas += port->capacity_m3 * (port->parameters->ambient_pa_abs - *pressure_pa_abs);
+    *pressure_pa_abs += duration_s * middle * port->slope;
+    if (!fills && *pressure_pa_abs < port->parameters->ambient_pa_abs && port->slope > 0.0) {
+        *gas += (port->parameters->ambient_pa_abs - *pressure_pa_abs) / port->slope;
         *pressure_pa_abs = port->parameters->ambient_pa_abs; /* a vent ends at ambient, it does not overshoot */
     }
-}
-
-/* 3 x 3 by Cramer's rule; the matrix is close to diagonal and never singular. */
-static void solve3(double a[3][3], const double b[3], double x[3]) {
-    const double minor0 = a[1][1] * a[2][2] - a[1][2] * a[2][1];
-    const double minor1 = a[1][2] * a[2][0] - a[1][0] * a[2][2];
-    const double minor2 = a[1][0] * a[2][1] - a[1][1] * a[2][0];
-    const double determinant = a[0][0] * minor0 + a[0][1] * minor1 + a[0][2] * minor2;
-    x[0] = (b[0] * minor0 + a[0][1] * (a[1][2] * b[2] - b[1] * a[2][2]) + a[0][2] * (b[1] * a[2][1] - a[1][1] * b[2])) /
-           determinant;
-    x[1] = (a[0][0] * (b[1] * a[2][2] - a[1][2] * b[2]) + b[0] * minor1 + a[0][2] * (a[1][0] * b[2] - b[1] * a[2][0])) /
-           determinant;
-    x[2] = (a[0][0] * (a[1][1] * b[2] - b[1] * a[2][1]) + a[0][1] * (b[1] * a[2][0] - a[1][0] * b[2]) + b[0] * minor2) /
-           determinant;
 }
 
 void chambers_step(struct chambers *chambers, const struct gas_parameters *parameters, const struct bend_table *table,
@@ -125,7 +207,7 @@ void chambers_step(struct chambers *chambers, const struct gas_parameters *param
             .conductance = parameters->sonic_conductance * influence->conductance_scale[c],
             .leak_conductance = influence->leak_conductance[c],
             .supply_pa_abs = parameters->ambient_pa_abs + (supply_open ? influence->supply_pa : 0.0),
-            .capacity_m3 = chambers->capacity[c][c],
+            .slope = chambers->own_slope[c] / chambers->capacity[c][c],
             .supply_open = supply_open};
         double pressure_pa_abs = parameters->ambient_pa_abs + chambers->pressure_pa[c];
         for (int64_t at_us = from_us; at_us < to_us;) {
@@ -137,18 +219,18 @@ void chambers_step(struct chambers *chambers, const struct gas_parameters *param
         }
         change[c] = chambers->gas[c] - before;
     }
-    /* pressures: the coupled linear step, then one Newton correction against the table */
-    double step[3], gap[3];
+    /* coordinates: the coupled linear step, then one Newton correction against the table */
+    double step[3];
     solve3(chambers->capacity, change, step);
     for (size_t c = 0; c < 3; c++) {
-        chambers->pressure_pa[c] += step[c];
+        chambers->coordinate[c] += step[c];
     }
     look_up(chambers, parameters, table);
-    for (size_t c = 0; c < 3; c++) {
-        gap[c] = chambers->gas[c] - (parameters->ambient_pa_abs + chambers->pressure_pa[c]) * chambers->volume_m3[c];
-    }
-    solve3(chambers->capacity, gap, step);
-    for (size_t c = 0; c < 3; c++) {
-        chambers->pressure_pa[c] += step[c];
+    meet_gas(chambers, parameters);
+    if (chambers->snaps) {
+        look_up(chambers, parameters, table);
+        choose_grid(chambers, parameters, table);
+    } else {
+        memcpy(chambers->pressure_pa, chambers->coordinate, sizeof chambers->pressure_pa);
     }
 }

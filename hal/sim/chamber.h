@@ -1,7 +1,10 @@
 /* The three chambers' gas: ISO 6358 flow in and out, isothermal ideal gas in a volume that follows the pressures.
  *
  * The state is p_abs V of each chamber with its tube (Pa m3, the gas mass but for R T); pressures follow from it and the
- * table's volumes. Beyond the table's axes volumes go on linearly. */
+ * table's volumes. Beyond the table's axes volumes go on linearly.
+ *
+ * A chamber of a module that snaps is followed by its volume while it is ballooned: its gas, far softer than the rubber's
+ * hysteresis, then decides where on the curve between the two stable branches it stands. One chamber at a time. */
 #ifndef TRIBEND_SIM_CHAMBER_H
 #define TRIBEND_SIM_CHAMBER_H
 
@@ -18,11 +21,18 @@ struct gas_parameters {
     double tube_volume_m3;
 };
 
+#define CHAMBERS_NONE 3u
+
 struct chambers {
     double pressure_pa[3];  /* gauge */
     double volume_m3[3];    /* chamber and tube */
     double gas[3];          /* p_abs V, Pa m3 */
-    double capacity[3][3];  /* d gas_i / d p_j, m3 */
+    uint32_t ballooned;     /* the chamber followed by its volume, or CHAMBERS_NONE */
+    double coordinate[3];   /* the pressure, or of the ballooned chamber its volume per reference length, m2 */
+    double capacity[3][3];  /* d gas_i / d coordinate_j */
+    double own_slope[3];    /* d pressure_i / d coordinate_i */
+    struct bend_table beyond; /* the ballooned states, where `snaps` */
+    bool snaps;
 };
 
 /* What effects may change for a step: nominal one and zero. */
@@ -35,6 +45,9 @@ struct chamber_influence {
 /* Mass flow from upstream to downstream, kg/s (ISO 6358-1:2013); negative pressures differences give zero. */
 double gas_mass_flow(const struct gas_parameters *parameters, double conductance, double up_pa_abs, double down_pa_abs);
 void chambers_init(struct chambers *chambers, const struct gas_parameters *parameters, const struct bend_table *table);
+/* The section at the chambers' state: curvature (x, y), 1/m, and stretch. */
+void chambers_curvature(const struct chambers *chambers, const struct bend_table *table, double curvature_1pm[2]);
+double chambers_stretch(const struct chambers *chambers, const struct bend_table *table);
 /* From `from_us` to `to_us` (at most a millisecond or so). `supply_open`: the shut-off valve. */
 void chambers_step(struct chambers *chambers, const struct gas_parameters *parameters, const struct bend_table *table,
                    const struct valve valve[3], const struct chamber_influence *influence, bool supply_open,

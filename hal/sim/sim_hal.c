@@ -36,7 +36,7 @@ void sim_init(struct sim *sim, const struct bend_table *table, const struct sim_
         random_seed(&sim->pressure_random[c], seed, 1 + c);
     }
     random_seed(&sim->tip_random, seed, 4);
-    body_shape_at(table, sim->chambers.pressure_pa, &sim->shape);
+    body_shape_of(table, &sim->chambers, &sim->shape);
     body_tip_pose(&table->module, &sim->shape, &sim->pose);
 }
 
@@ -65,7 +65,7 @@ static void run_effects(struct sim *sim, enum effect_stage stage, int64_t step_u
 /* The body is quasi-static: it is only looked up when a sample is taken, with effects stepping over the time between. */
 static void sample_tip(struct sim *sim) {
     struct hal_tip_sample sample;
-    body_shape_at(sim->table, sim->chambers.pressure_pa, &sim->shape);
+    body_shape_of(sim->table, &sim->chambers, &sim->shape);
     run_effects(sim, EFFECT_STAGE_BODY, sim->parameters.sensor.tip_period_us);
     body_tip_pose(&sim->table->module, &sim->shape, &sim->pose);
     run_effects(sim, EFFECT_STAGE_TIP, sim->parameters.sensor.tip_period_us);

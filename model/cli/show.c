@@ -92,6 +92,35 @@ static void print_bends(const struct bend_table *table) {
     }
 }
 
+/* The greatest and the least pressure, and the states of one chamber alone between and beyond, by its volume. */
+static void print_snap(const struct bend_table *table) {
+    const struct bend_table_module *module = &table->module;
+    struct bend_table ballooned;
+    if (module->jump_up_pa == 0.0f) {
+        printf("snap             none up to the end of the axes\n");
+        return;
+    }
+    printf("snap             chamber 1 alone balloons at %.0f Pa; ", (double)module->jump_up_pa);
+    if (module->jump_down_pa > 0.0f) {
+        printf("it falls back at %.0f Pa\n", (double)module->jump_down_pa);
+    } else {
+        printf("no second stable branch up to where the model holds\n");
+    }
+    if (!bend_table_ballooned(table, &ballooned)) {
+        return;
+    }
+    for (uint32_t v = 0; v < ballooned.nodes[0]; v++) {
+        const size_t at = (size_t)v * ballooned.nodes[1] * ballooned.nodes[2];
+        const double x = (double)ballooned.channel[BEND_TABLE_CURVATURE_X][at];
+        const double y = (double)ballooned.channel[BEND_TABLE_CURVATURE_Y][at];
+        printf("  %9.1f Pa %8.3f deg, chamber 1 holds %.2f ml, %s%s\n", (double)ballooned.channel[BEND_TABLE_PRESSURE_1][at],
+               hypot(x, y) * (double)module->active_length_m * DEGREES,
+               1e6 * (double)ballooned.axis_pa[0][v] * (double)module->chamber_length_m,
+               (ballooned.tag[at] & (unsigned)BEND_TABLE_TAG_STABLE) != 0 ? "stable" : "unstable",
+               (ballooned.tag[at] & (unsigned)BEND_TABLE_TAG_BEYOND_STRAIN) != 0 ? ", beyond fit" : "");
+    }
+}
+
 int cli_show(int argc, char **argv) {
     struct arguments arguments = {NULL, NULL};
     struct table_file file;
@@ -115,6 +144,7 @@ int cli_show(int argc, char **argv) {
     print_tags(&file.table);
     print_ranges(&file.table);
     print_bends(&file.table);
+    print_snap(&file.table);
     table_file_close(&file);
     return EXIT_OK;
 }

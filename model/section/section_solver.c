@@ -632,10 +632,23 @@ static void add_scaled(double *to, double factor, const double *from, size_t cou
 
 static const double no_direction[MODULE_CHAMBERS] = {0.0, 0.0, 0.0};
 
-static bool newton(struct section_solver *solver) {
+/* With the volume of chamber 1 given, its pressure becomes an unknown: the step that meets the volume to first order. */
+static void meet_volume(struct section_solver *solver, double volume) {
+    const double gap = volume - solver->volume[0] - dot(solver->load, solver->increment, equations(solver));
+    const double change = gap / dot(solver->load, solver->tangent_step, equations(solver));
+    add_scaled(solver->increment, change, solver->tangent_step, equations(solver));
+    solver->pressure[0] += change;
+}
+
+/* `volume` of chamber 1 (over radius^2), or NAN: its pressure is given. */
+static bool newton(struct section_solver *solver, double volume) {
+    static const double first_chamber[MODULE_CHAMBERS] = {1.0, 0.0, 0.0};
     for (int i = 0; i < NEWTON_ITERATIONS_MAX; i++) {
-        if (!assemble(solver, no_direction) || !solve_bordered(solver)) {
+        if (!assemble(solver, isnan(volume) ? no_direction : first_chamber) || !solve_bordered(solver)) {
             return false;
+        }
+        if (!isnan(volume)) {
+            meet_volume(solver, volume);
         }
         const double change = section_largest_change(solver, solver->increment);
         solver->iterations++;
@@ -657,18 +670,16 @@ static bool landed_near(struct section_solver *solver, const double *start) {
     return section_largest_change(solver, solver->tangent_step) < DISPLACEMENT_STEP_MAX;
 }
 
-bool section_solver_move_to(struct section_solver *solver, const double pressure_pa[3]) {
-    static const struct section_load none = {0.0, {0.0, 0.0}};
-    return section_solver_move_to_loaded(solver, pressure_pa, &none);
-}
+/* Where a move goes, without dimension. */
+struct destination {
+    double pressure[MODULE_CHAMBERS];
+    double force[GLOBALS];
+    double volume; /* of chamber 1, whose pressure is then an unknown; NAN: none given */
+};
 
-bool section_solver_move_to_loaded(struct section_solver *solver, const double pressure_pa[3],
-                                   const struct section_load *load) {
+/* Straight to the destination, or in as many steps as it takes; at given pressures over stable states only. */
+static bool move(struct section_solver *solver, const struct destination *to) {
     const size_t bytes = section_solver_unknowns(solver) * sizeof(double);
-    const double force_unit = solver->modulus_pa * solver->radius_m * solver->radius_m;
-    /* the reported curvature is (ky, -kx) of the section's globals */
-    const double force[GLOBALS] = {load->axial_n / force_unit, -load->moment_nm[1] / (force_unit * solver->radius_m),
-                                   load->moment_nm[0] / (force_unit * solver->radius_m)};
     double *origin = malloc(bytes), *start = malloc(bytes);
     bool reached = false;
     solver->iterations = 0;
@@ -676,15 +687,19 @@ bool section_solver_move_to_loaded(struct section_solver *solver, const double p
         section_solver_save(solver, origin);
         double done = 0.0, step = 1.0;
         const double *from = origin + equations(solver), *force_from = from + MODULE_CHAMBERS;
+        const bool by_volume = !isnan(to->volume);
+        const double volume_from = by_volume && assemble(solver, no_direction) ? solver->volume[0] : NAN;
         while (done < 1.0 && step >= SUBSTEP_LEAST) {
+            const double share = done + step;
             section_solver_save(solver, start);
-            for (size_t c = 0; c < MODULE_CHAMBERS; c++) {
-                solver->pressure[c] = from[c] + (done + step) * (pressure_pa[c] / solver->modulus_pa - from[c]);
+            for (size_t c = by_volume ? 1 : 0; c < MODULE_CHAMBERS; c++) {
+                solver->pressure[c] = from[c] + share * (to->pressure[c] - from[c]);
             }
             for (size_t m = 0; m < GLOBALS; m++) {
-                solver->force[m] = force_from[m] + (done + step) * (force[m] - force_from[m]);
+                solver->force[m] = force_from[m] + share * (to->force[m] - force_from[m]);
             }
-            if (newton(solver) && solver->stable && landed_near(solver, start)) {
+            const double volume = volume_from + share * (to->volume - volume_from);
+            if (newton(solver, volume) && (by_volume || solver->stable) && landed_near(solver, start)) {
                 done += step;
                 step = fmin(2.0 * step, 1.0 - done);
             } else {
@@ -700,6 +715,33 @@ bool section_solver_move_to_loaded(struct section_solver *solver, const double p
     free(origin);
     free(start);
     return reached;
+}
+
+bool section_solver_move_to(struct section_solver *solver, const double pressure_pa[3]) {
+    static const struct section_load none = {0.0, {0.0, 0.0}};
+    return section_solver_move_to_loaded(solver, pressure_pa, &none);
+}
+
+bool section_solver_move_to_loaded(struct section_solver *solver, const double pressure_pa[3],
+                                   const struct section_load *load) {
+    const double force_unit = solver->modulus_pa * solver->radius_m * solver->radius_m;
+    const double moment_unit = force_unit * solver->radius_m;
+    struct destination to = {.volume = NAN};
+    for (size_t c = 0; c < MODULE_CHAMBERS; c++) {
+        to.pressure[c] = pressure_pa[c] / solver->modulus_pa;
+    }
+    /* the reported curvature is (ky, -kx) of the section's globals */
+    to.force[0] = load->axial_n / force_unit;
+    to.force[1] = -load->moment_nm[1] / moment_unit;
+    to.force[2] = load->moment_nm[0] / moment_unit;
+    return move(solver, &to);
+}
+
+bool section_solver_move_to_volume(struct section_solver *solver, double volume_1_m2, double pressure_2_pa,
+                                   double pressure_3_pa) {
+    const struct destination to = {.pressure = {0.0, pressure_2_pa / solver->modulus_pa, pressure_3_pa / solver->modulus_pa},
+                                   .volume = volume_1_m2 / (solver->radius_m * solver->radius_m)};
+    return move(solver, &to);
 }
 
 /* --- for the path and the checks --- */

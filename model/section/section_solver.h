@@ -63,6 +63,10 @@ struct section_load {
 /* The same with a load, which then stays until the next move or reset. */
 bool section_solver_move_to_loaded(struct section_solver *solver, const double pressure_pa[3],
                                    const struct section_load *load);
+/* With the volume of chamber 1 given instead of its pressure: this passes the limit point of an inflating chamber, where
+ * no state at given pressures is stable. Volume per reference length, as in struct section_state; no load. */
+bool section_solver_move_to_volume(struct section_solver *solver, double volume_1_m2, double pressure_2_pa,
+                                   double pressure_3_pa);
 void section_solver_state(struct section_solver *solver, struct section_state *state);
 /* Undeformed again. */
 void section_solver_reset(struct section_solver *solver);

@@ -148,7 +148,7 @@ static void tip_lost(void **state) {
         const double wanted_x = (double)rig.command.bend_rad * cos((double)rig.command.direction_rad);
         const double wanted_y = (double)rig.command.bend_rad * sin((double)rig.command.direction_rad);
         struct body_shape shape;
-        body_shape_at(&rig_file.table, rig.sim.sim.chambers.pressure_pa, &shape);
+        body_shape_of(&rig_file.table, &rig.sim.sim.chambers, &shape);
         assert_under(hypot(shape.bend_x_rad - wanted_x, shape.bend_y_rad - wanted_y) * 180.0 / M_PI, 1.5);
         /* and the loop closes again when samples come back */
         rig.sim.sim.faults.tip_stops = false;

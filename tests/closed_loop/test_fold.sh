@@ -22,7 +22,10 @@ check() {
         failed=$((failed + 1))
     fi
 }
-check table_has_an_edge '[1-9][0-9]* without an equilibrium' "$build/tribend-tables" show "$table"
+check table_knows_the_limit_point 'chamber 1 alone balloons at 7[0-9]{3} Pa' "$build/tribend-tables" show "$table"
+both=$scratch/both.tbt
+"$build/tribend-tables" build paper-circle --material ecoflex-0030-c30-positive --nodes 4 --mesh-size 1.5mm -q -o "$both" >"$scratch/said" || cat "$scratch/said"
+check table_has_both_stable_branches 'balloons at 3[12][0-9]{2} Pa; it falls back at (29|30)[0-9]{2} Pa' "$build/tribend-tables" show "$both"
 check bend_inside 'warnings +none' "$build/tribend" bend 8deg --for 3s -q --table "$table"
 for toward in 0 30 75 180; do
     check "bend_beyond_toward_$toward" 'out of reach' "$build/tribend" bend 60deg --toward "${toward}deg" --for 3s -q --table "$table"

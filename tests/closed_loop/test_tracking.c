@@ -19,7 +19,7 @@ static struct error steady_error(struct rig *rig, const struct controller_comman
     for (int i = 0; i < WINDOW_MS; i++) {
         struct body_shape shape;
         rig_step(rig);
-        body_shape_at(rig->sim.sim.table, rig->sim.sim.chambers.pressure_pa, &shape);
+        body_shape_of(rig->sim.sim.table, &rig->sim.sim.chambers, &shape);
         for (size_t e = 0; e < rig->sim.sim.effect_count; e++) {
             shape = rig->sim.sim.shape; /* an effect bends the body too: as it was at the last tip sample */
         }

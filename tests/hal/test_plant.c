@@ -169,6 +169,90 @@ static void a_shut_supply_gives_no_air(void **state) {
     synthetic_table_free(&synthetic);
 }
 
+/* --- a snap --- */
+
+/* A chamber that softens and stiffens again: p = 1250 (x^3 - 6 x^2 + 9 x) Pa, x = (V - 20 mm2) / 40 mm2. It rises to 5000 Pa
+ * at x = 1, falls to nothing at x = 3 but for 2000 Pa x / 3 more, which makes both turning points move a little. */
+static double balloon_pa(double volume_m2) {
+    const double x = (volume_m2 - 2e-5) / 4e-5;
+    return 1250.0 * x * (9.0 + x * (x - 6.0)) + 2000.0 / 3.0 * x;
+}
+
+static double balloon_m2(double pressure_pa) {
+    double low = 2e-5, high = 6e-5;
+    for (int i = 0; i < 60; i++) {
+        const double middle = 0.5 * (low + high);
+        *(balloon_pa(middle) < pressure_pa ? &low : &high) = middle;
+    }
+    return low;
+}
+
+/* Only chambers' own pressures matter; chamber 1 bends to -x by its volume. */
+static double low_branch(enum bend_table_channel channel, const double pressure_pa[3]) {
+    if (channel >= BEND_TABLE_VOLUME_1 && channel <= BEND_TABLE_VOLUME_3) {
+        return balloon_m2(pressure_pa[(int)channel - (int)BEND_TABLE_VOLUME_1]);
+    }
+    return channel == BEND_TABLE_CURVATURE_X ? -1e6 * (balloon_m2(pressure_pa[0]) - 2e-5) : 1.0;
+}
+
+static double ballooned_branch(enum bend_table_channel channel, const double point[3]) {
+    if (channel == BEND_TABLE_PRESSURE_1) {
+        return balloon_pa(point[0]);
+    }
+    if (channel == BEND_TABLE_VOLUME_2 || channel == BEND_TABLE_VOLUME_3) {
+        return balloon_m2(point[(int)channel - (int)BEND_TABLE_VOLUME_1]);
+    }
+    return channel == BEND_TABLE_CURVATURE_X ? -1e6 * (point[0] - 2e-5) : channel == BEND_TABLE_CURVATURE_Y ? 0.0 : 1.0;
+}
+
+/* Chamber `c` filled and vented slowly: its pressure follows the whole curve up and down, no gas is made or lost, and the
+ * tip goes where that chamber points. */
+static void a_snapping_chamber_follows_its_curve_and_comes_back(void **state) {
+    (void)state;
+    struct synthetic_table synthetic;
+    struct sim_parameters parameters;
+    sim_default_parameters(&parameters);
+    parameters.gas.sonic_conductance *= 0.02;
+    synthetic_table_create(&synthetic, 25, 5000.0, 1.0, low_branch);
+    synthetic_table_add_ballooned(&synthetic, 25, balloon_m2(4300.0), 2.2e-4, 5000.0, 5340.0f, 1980.0f, ballooned_branch);
+    for (size_t c = 0; c < 3; c++) {
+        struct chambers chambers;
+        struct body_shape shape;
+        struct valve valve[3] = {{0, 0}, {0, 0}, {0, 0}};
+        const struct chamber_influence influence = {.conductance_scale = {1.0, 1.0, 1.0}, .supply_pa = 40000.0};
+        double top_pa = 0.0, least_after_pa = 1e9;
+        int64_t at_us = 0;
+        chambers_init(&chambers, &parameters.gas, &synthetic.table);
+        assert_true(chambers.snaps);
+        valve[c] = (struct valve){0, INT64_MAX};
+        for (; chambers.volume_m3[c] < 2e-6 + 0.055 * 2.1e-4; at_us += 1000) {
+            chambers_step(&chambers, &parameters.gas, &synthetic.table, valve, &influence, true, at_us, at_us + 1000);
+            const double volume_m2 = (chambers.volume_m3[c] - parameters.gas.tube_volume_m3) / 0.055;
+            assert_close(chambers.pressure_pa[c], balloon_pa(volume_m2), 25.0);
+            assert_relative(chambers.gas[c], (101325.0 + chambers.pressure_pa[c]) * chambers.volume_m3[c], 1e-4);
+            top_pa = volume_m2 < 1e-4 ? fmax(top_pa, chambers.pressure_pa[c]) : top_pa;
+            least_after_pa = volume_m2 > 1e-4 ? fmin(least_after_pa, chambers.pressure_pa[c]) : least_after_pa;
+            assert_true(at_us < 100000000);
+        }
+        assert_close(top_pa, 5682.0, 60.0);
+        assert_close(least_after_pa, 1983.0, 60.0);
+        assert_int_equal(chambers.ballooned, c);
+        body_shape_of(&synthetic.table, &chambers, &shape);
+        const double bend_rad = 0.055 * 1e6 * 1.9e-4, direction_rad = M_PI + (double)c * 2.0 * M_PI / 3.0;
+        assert_relative(hypot(shape.bend_x_rad, shape.bend_y_rad), bend_rad, 5e-3);
+        assert_close(cos(atan2(shape.bend_y_rad, shape.bend_x_rad) - direction_rad), 1.0, 1e-6);
+        valve[c] = (struct valve){0, 0};
+        for (const int64_t end_us = at_us + 240000000; at_us < end_us; at_us += 1000) {
+            chambers_step(&chambers, &parameters.gas, &synthetic.table, valve, &influence, true, at_us, at_us + 1000);
+        }
+        assert_int_equal(chambers.ballooned, CHAMBERS_NONE);
+        for (size_t d = 0; d < 3; d++) {
+            assert_close(chambers.pressure_pa[d], 0.0, 20.0);
+        }
+    }
+    synthetic_table_free(&synthetic);
+}
+
 /* --- body --- */
 
 static const struct bend_table_module module = {.chamber_length_m = 0.055f, .active_length_m = 0.055f,
@@ -206,10 +290,14 @@ static void a_quarter_turn_is_where_geometry_says(void **state) {
 static void chamber_one_alone_moves_the_tip_to_minus_x(void **state) {
     (void)state;
     struct synthetic_table synthetic;
+    struct sim_parameters parameters;
+    struct chambers chambers;
     struct body_shape shape;
-    const double pressure_pa[3] = {5000.0, 0.0, 0.0};
     synthetic_table_create(&synthetic, 9, 10000.0, 1.0, synthetic_module);
-    body_shape_at(&synthetic.table, pressure_pa, &shape);
+    sim_default_parameters(&parameters);
+    chambers_init(&chambers, &parameters.gas, &synthetic.table);
+    chambers.coordinate[0] = 5000.0;
+    body_shape_of(&synthetic.table, &chambers, &shape);
     assert_relative(shape.bend_x_rad, -0.055 * (1e-3 * 5000.0 + 2e-7 * 2.5e7), 1e-5);
     assert_close(shape.bend_y_rad, 0.0, 1e-7);
     synthetic_table_free(&synthetic);
@@ -334,6 +422,7 @@ int main(void) {
         cmocka_unit_test(a_chamber_ends_at_the_supply_and_vents_to_ambient),
         cmocka_unit_test(halving_the_step_changes_a_fill_by_little),
         cmocka_unit_test(a_shut_supply_gives_no_air),
+        cmocka_unit_test(a_snapping_chamber_follows_its_curve_and_comes_back),
         cmocka_unit_test(a_straight_module_stands_up),
         cmocka_unit_test(a_quarter_turn_is_where_geometry_says),
         cmocka_unit_test(chamber_one_alone_moves_the_tip_to_minus_x),

@@ -42,45 +42,77 @@ static void fill_header(struct synthetic_table *synthetic, uint32_t nodes, doubl
     put(image, BEND_TABLE_OFFSET_CHANNEL_TEXT, BEND_TABLE_CHANNEL_TEXT, sizeof BEND_TABLE_CHANNEL_TEXT);
 }
 
-static size_t fill_channel(struct synthetic_table *synthetic, size_t offset, uint32_t nodes, const float *axis,
-                           enum bend_table_channel channel, synthetic_channel formula) {
-    for (size_t i = 0; i < nodes; i++) {
-        for (size_t j = 0; j < nodes; j++) {
-            for (size_t k = 0; k < nodes; k++) {
-                const double pressure_pa[3] = {(double)axis[i], (double)axis[j], (double)axis[k]};
-                const float value = (float)formula(channel, pressure_pa);
-                put(synthetic->image, offset, &value, sizeof value);
-                offset += sizeof value;
-            }
+/* A grid with the same number of nodes on each axis; returns where it ends. */
+static size_t fill_grid(struct synthetic_table *synthetic, size_t offset, uint32_t nodes,
+                        float axis[3][BEND_TABLE_AXIS_NODES_MAX], synthetic_channel formula) {
+    const size_t all = (size_t)nodes * nodes * nodes;
+    for (size_t a = 0; a < 3; a++) {
+        put(synthetic->image, offset, axis[a], 4u * nodes);
+        offset += 4u * nodes;
+    }
+    for (size_t c = 0; c < BEND_TABLE_CHANNEL_COUNT; c++) {
+        for (size_t at = 0; at < all; at++) {
+            const double point[3] = {(double)axis[0][at / nodes / nodes], (double)axis[1][at / nodes % nodes],
+                                     (double)axis[2][at % nodes]};
+            const float value = (float)formula((enum bend_table_channel)c, point);
+            put(synthetic->image, offset, &value, sizeof value);
+            offset += sizeof value;
         }
     }
-    return offset;
+    memset(synthetic->image + offset, (int)(BEND_TABLE_TAG_VALID | BEND_TABLE_TAG_STABLE), all);
+    return (offset + all + 3u) / 4u * 4u;
+}
+
+static size_t grid_bytes(uint32_t nodes) {
+    const size_t all = (size_t)nodes * nodes * nodes;
+    return (4u * (3u * nodes + BEND_TABLE_CHANNEL_COUNT * all) + all + 3u) / 4u * 4u;
+}
+
+static void open_again(struct synthetic_table *synthetic) {
+    synthetic_table_seal(synthetic);
+    assert_int_equal(bend_table_open(&synthetic->table, synthetic->image, synthetic->size, "synthetic"),
+                     BEND_TABLE_OK);
 }
 
 void synthetic_table_create(struct synthetic_table *synthetic, uint32_t nodes, double most_pa, double exponent,
                             synthetic_channel channel) {
-    const size_t all = (size_t)nodes * nodes * nodes;
-    float axis[BEND_TABLE_AXIS_NODES_MAX];
-    size_t offset = BEND_TABLE_HEADER_BYTES;
+    float axis[3][BEND_TABLE_AXIS_NODES_MAX];
     assert_true(nodes <= BEND_TABLE_AXIS_NODES_MAX);
-    synthetic->size = (offset + 4u * (3u * nodes + BEND_TABLE_CHANNEL_COUNT * all) + all + 3u) / 4u * 4u;
+    synthetic->size = BEND_TABLE_HEADER_BYTES + grid_bytes(nodes);
     synthetic->image = calloc(1, synthetic->size);
     assert_non_null(synthetic->image);
     fill_header(synthetic, nodes, most_pa);
-    for (size_t i = 0; i < nodes; i++) {
-        axis[i] = (float)(most_pa * pow((double)i / (double)(nodes - 1), exponent));
-    }
     for (size_t a = 0; a < 3; a++) {
-        put(synthetic->image, offset, axis, 4u * nodes);
-        offset += 4u * nodes;
+        for (size_t i = 0; i < nodes; i++) {
+            axis[a][i] = (float)(most_pa * pow((double)i / (double)(nodes - 1), exponent));
+        }
     }
-    for (int c = 0; c < (int)BEND_TABLE_CHANNEL_COUNT; c++) {
-        offset = fill_channel(synthetic, offset, nodes, axis, (enum bend_table_channel)c, channel);
+    assert_int_equal(fill_grid(synthetic, BEND_TABLE_HEADER_BYTES, nodes, axis, channel), synthetic->size);
+    open_again(synthetic);
+}
+
+void synthetic_table_add_ballooned(struct synthetic_table *synthetic, uint32_t nodes, double least_m2, double most_m2,
+                                   double others_pa, float jump_up_pa, float jump_down_pa, synthetic_channel channel) {
+    float axis[3][BEND_TABLE_AXIS_NODES_MAX];
+    const size_t end = synthetic->size;
+    synthetic->size += grid_bytes(nodes);
+    uint8_t *image = realloc(synthetic->image, synthetic->size);
+    assert_non_null(image);
+    synthetic->image = image;
+    for (size_t i = 0; i < nodes; i++) {
+        const double share = (double)i / (double)(nodes - 1);
+        axis[0][i] = (float)(least_m2 * pow(most_m2 / least_m2, share));
+        axis[1][i] = axis[2][i] = (float)(others_pa * share);
     }
-    memset(synthetic->image + offset, (int)(BEND_TABLE_TAG_VALID | BEND_TABLE_TAG_STABLE), all);
-    synthetic_table_seal(synthetic);
-    assert_int_equal(bend_table_open(&synthetic->table, synthetic->image, synthetic->size, "synthetic"),
-                     BEND_TABLE_OK);
+    assert_int_equal(fill_grid(synthetic, end, nodes, axis, channel), synthetic->size);
+    const uint32_t size = (uint32_t)synthetic->size;
+    put(image, BEND_TABLE_OFFSET_IMAGE_BYTES, &size, sizeof size);
+    for (size_t a = 0; a < 3; a++) {
+        put(image, BEND_TABLE_OFFSET_BALLOONED + 4 * a, &nodes, sizeof nodes);
+    }
+    put(image, BEND_TABLE_OFFSET_JUMPS, &jump_up_pa, sizeof jump_up_pa);
+    put(image, BEND_TABLE_OFFSET_JUMPS + 4, &jump_down_pa, sizeof jump_down_pa);
+    open_again(synthetic);
 }
 
 void synthetic_table_free(struct synthetic_table *synthetic) {

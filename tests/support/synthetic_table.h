@@ -16,6 +16,10 @@ struct synthetic_table {
 /* `nodes` on every axis from 0 to `most_pa`, packed toward zero by `exponent` (1: evenly). Fails the test on trouble. */
 void synthetic_table_create(struct synthetic_table *synthetic, uint32_t nodes, double most_pa, double exponent,
                             synthetic_channel channel);
+/* Appends a ballooned grid: `nodes` volumes of chamber 1 from `least_m2` to `most_m2`, evenly spaced logarithms, the other
+ * chambers from 0 to `others_pa`. `channel` is then asked at {volume of chamber 1, pressure of 2, pressure of 3}. */
+void synthetic_table_add_ballooned(struct synthetic_table *synthetic, uint32_t nodes, double least_m2, double most_m2,
+                                   double others_pa, float jump_up_pa, float jump_down_pa, synthetic_channel channel);
 /* The CRC of the image as it now is, for tests that damage it on purpose. */
 void synthetic_table_seal(struct synthetic_table *synthetic);
 void synthetic_table_free(struct synthetic_table *synthetic);
