@@ -48,7 +48,8 @@ static size_t point_of(const struct chambers *chambers, const struct bend_table 
     const size_t first = beyond ? chambers->ballooned : 0;
     double at[3];
     for (size_t a = 0; a < 3; a++) {
-        at[a] = chambers->coordinate[(first + a) % 3];
+        const size_t c = (first + a) % 3;
+        at[a] = chambers->coordinate[c] / (c == chambers->ballooned ? 1.0 : chambers->stiffness_scale);
     }
     table_point_at(point, beyond ? &chambers->beyond : table, at);
     return first;
@@ -57,7 +58,7 @@ static size_t point_of(const struct chambers *chambers, const struct bend_table 
 /* Pressures, volumes and capacities at the present coordinates. */
 static void look_up(struct chambers *chambers, const struct gas_parameters *parameters,
                     const struct bend_table *table) {
-    const double length_m = (double)table->module.chamber_length_m;
+    const double length_m = (double)table->module.chamber_length_m, scale = chambers->stiffness_scale;
     struct table_point point;
     const size_t first = point_of(chambers, table, &point);
     for (size_t a = 0; a < 3; a++) {
@@ -65,9 +66,13 @@ static void look_up(struct chambers *chambers, const struct gas_parameters *para
         const bool by_volume = c == chambers->ballooned;
         double gradient[3];
         const double value = table_point_value(&point, volume_channel(a), gradient);
+        for (size_t d = 0; d < 3; d++) {
+            gradient[d] *= by_volume ? scale : 1.0;
+            gradient[d] /= (first + d) % 3 == chambers->ballooned ? 1.0 : scale;
+        }
         const double volume_m2 = by_volume ? chambers->coordinate[c] : value;
-        chambers->pressure_pa[c] = by_volume ? value : chambers->coordinate[c];
-        chambers->volume_m3[c] = parameters->tube_volume_m3 + length_m * volume_m2;
+        chambers->pressure_pa[c] = by_volume ? scale * value : chambers->coordinate[c];
+        chambers->volume_m3[c] = parameters->tube_volume_m3 + chambers->extra_volume_m3[c] + length_m * volume_m2;
         chambers->own_slope[c] = by_volume ? gradient[a] : 1.0;
         const double pressure_pa_abs = parameters->ambient_pa_abs + chambers->pressure_pa[c];
         for (size_t d = 0; d < 3; d++) {
@@ -101,6 +106,7 @@ double chambers_stretch(const struct chambers *chambers, const struct bend_table
 void chambers_init(struct chambers *chambers, const struct gas_parameters *parameters, const struct bend_table *table) {
     memset(chambers, 0, sizeof *chambers);
     chambers->ballooned = CHAMBERS_NONE;
+    chambers->stiffness_scale = parameters->stiffness_scale;
     chambers->snaps = bend_table_ballooned(table, &chambers->beyond);
     look_up(chambers, parameters, table);
     for (size_t c = 0; c < 3; c++) {
@@ -145,7 +151,8 @@ static void choose_grid(struct chambers *chambers, const struct gas_parameters *
         for (uint32_t c = 1; c < 3; c++) {
             largest = chambers->volume_m3[c] > chambers->volume_m3[largest] ? c : largest;
         }
-        const double volume_m2 = (chambers->volume_m3[largest] - parameters->tube_volume_m3) / length_m;
+        const double volume_m2 =
+            (chambers->volume_m3[largest] - chambers->extra_volume_m3[largest] - parameters->tube_volume_m3) / length_m;
         if (volume_m2 > (double)chambers->beyond.axis_pa[0][1]) {
             chambers->ballooned = largest;
             chambers->coordinate[largest] = volume_m2;
@@ -183,8 +190,10 @@ static double gas_rate(const struct port *port, bool fills, double chamber_pa_ab
     return parameters->gas_constant * parameters->temperature_k * flow;
 }
 
-/* One stretch of time with the valve at rest, by the midpoint rule; pressure moves by the chamber's own capacity. */
-static void integrate(const struct port *port, bool fills, double duration_s, double *gas, double *pressure_pa_abs) {
+/* One stretch of time with the valve at rest, by the midpoint rule; pressure moves by the chamber's own capacity. Returns
+ * the change of gas. */
+static double integrate(const struct port *port, bool fills, double duration_s, double *gas, double *pressure_pa_abs) {
+    const double before = *gas;
     const double half = 0.5 * duration_s * port->slope;
     const double start = gas_rate(port, fills, *pressure_pa_abs);
     const double middle = gas_rate(port, fills, fmax(*pressure_pa_abs + half * start, 0.0));
@@ -194,12 +203,26 @@ static void integrate(const struct port *port, bool fills, double duration_s, do
         *gas += (port->parameters->ambient_pa_abs - *pressure_pa_abs) / port->slope;
         *pressure_pa_abs = port->parameters->ambient_pa_abs; /* a vent ends at ambient, it does not overshoot */
     }
+    return *gas - before;
+}
+
+/* More or less dead volume appears at the chamber's pressure: no air moves. */
+static void resize(struct chambers *chambers, const struct gas_parameters *parameters,
+                   const struct chamber_influence *influence) {
+    for (size_t c = 0; c < 3; c++) {
+        const double change_m3 = influence->extra_volume_m3[c] - chambers->extra_volume_m3[c];
+        chambers->extra_volume_m3[c] = influence->extra_volume_m3[c];
+        chambers->volume_m3[c] += change_m3;
+        chambers->capacity[c][c] += change_m3;
+        chambers->gas[c] += (parameters->ambient_pa_abs + chambers->pressure_pa[c]) * change_m3;
+    }
 }
 
 void chambers_step(struct chambers *chambers, const struct gas_parameters *parameters, const struct bend_table *table,
                    const struct valve valve[3], const struct chamber_influence *influence, bool supply_open,
                    int64_t from_us, int64_t to_us) {
-    double change[3];
+    double change[3], drawn = 0.0;
+    resize(chambers, parameters, influence);
     for (size_t c = 0; c < 3; c++) {
         const double before = chambers->gas[c];
         const struct port port = {
@@ -213,12 +236,16 @@ void chambers_step(struct chambers *chambers, const struct gas_parameters *param
         for (int64_t at_us = from_us; at_us < to_us;) {
             const int64_t switch_us = valve_next_switch_us(&valve[c], at_us);
             const int64_t end_us = switch_us < to_us ? switch_us : to_us;
-            integrate(&port, valve_fills(&valve[c], at_us), 1e-6 * (double)(end_us - at_us), &chambers->gas[c],
-                      &pressure_pa_abs);
+            const bool fills = valve_fills(&valve[c], at_us);
+            const double moved =
+                integrate(&port, fills, 1e-6 * (double)(end_us - at_us), &chambers->gas[c], &pressure_pa_abs);
+            drawn += fills ? fmax(moved, 0.0) : 0.0;
             at_us = end_us;
         }
         change[c] = chambers->gas[c] - before;
     }
+    chambers->supply_flow_kgps =
+        drawn / (parameters->gas_constant * parameters->temperature_k * 1e-6 * (double)(to_us - from_us));
     /* coordinates: the coupled linear step, then one Newton correction against the table */
     double step[3];
     solve3(chambers->capacity, change, step);

@@ -19,6 +19,7 @@ struct gas_parameters {
     double reference_density_kgpm3;
     double critical_ratio;
     double tube_volume_m3;
+    double stiffness_scale; /* the module's over the table's: its states come at that many times the pressure */
 };
 
 #define CHAMBERS_NONE 3u
@@ -31,6 +32,9 @@ struct chambers {
     double coordinate[3];   /* the pressure, or of the ballooned chamber its volume per reference length, m2 */
     double capacity[3][3];  /* d gas_i / d coordinate_j */
     double own_slope[3];    /* d pressure_i / d coordinate_i */
+    double extra_volume_m3[3]; /* beside chamber and tube */
+    double supply_flow_kgps;   /* drawn from the supply, mean over the last step */
+    double stiffness_scale;
     struct bend_table beyond; /* the ballooned states, where `snaps` */
     bool snaps;
 };
@@ -39,6 +43,8 @@ struct chambers {
 struct chamber_influence {
     double conductance_scale[3];
     double leak_conductance[3]; /* to ambient, m3/(s Pa) */
+    double extra_volume_m3[3];
+    double coupling[3][3];      /* [i][j]: share of chamber j's pressure that stands in chamber i on top of its own */
     double supply_pa;
 };
 

@@ -41,31 +41,150 @@ const struct effect_kind *effect_kind_find(const char *name) {
     return NULL;
 }
 
+const char *effect_stage_name(enum effect_stage stage) {
+    static const char *const names[EFFECT_STAGE_COUNT] = {
+        [EFFECT_STAGE_SUPPLY] = "supply", [EFFECT_STAGE_VALVE] = "valve", [EFFECT_STAGE_PRESSURE_SENSOR] = "pressure sensor",
+        [EFFECT_STAGE_BODY] = "body",     [EFFECT_STAGE_TIP_SENSOR] = "tip sensor"};
+    return names[stage];
+}
+
+static effect_hook hook_of(const struct effect_kind *kind, enum effect_hook_kind hook) {
+    switch (hook) {
+    case EFFECT_HOOK_COMMAND:
+        return kind->command;
+    case EFFECT_HOOK_GAS:
+        return kind->gas;
+    case EFFECT_HOOK_READING:
+        return kind->reading;
+    case EFFECT_HOOK_LOAD:
+        return kind->load;
+    case EFFECT_HOOK_SHAPE:
+        return kind->shape;
+    case EFFECT_HOOK_POSE:
+    default:
+        return kind->pose;
+    }
+}
+
+bool effect_has(const struct effect_kind *kind, enum effect_hook_kind hook) {
+    return hook_of(kind, hook) != NULL;
+}
+
+/* What a hook may change of single chambers. */
+struct per_chamber {
+    double duty[3], late_s[3], reading_pa[3], load_pa[3];
+    struct chamber_influence influence;
+};
+
+static void copy3(double *to, const double *from) {
+    if (to != NULL && from != NULL) {
+        memcpy(to, from, 3 * sizeof *to);
+    }
+}
+
+static void keep(struct per_chamber *kept, const struct effect_signals *signals) {
+    copy3(kept->duty, signals->duty);
+    copy3(kept->late_s, signals->late_s);
+    copy3(kept->reading_pa, signals->reading_pa);
+    copy3(kept->load_pa, signals->load_pa);
+    if (signals->influence != NULL) {
+        kept->influence = *signals->influence;
+    }
+}
+
+static void put_back(struct effect_signals *signals, const struct per_chamber *kept, size_t c) {
+    double *const to[4] = {signals->duty, signals->late_s, signals->reading_pa, signals->load_pa};
+    const double *const from[4] = {kept->duty, kept->late_s, kept->reading_pa, kept->load_pa};
+    for (size_t i = 0; i < 4; i++) {
+        if (to[i] != NULL) {
+            to[i][c] = from[i][c];
+        }
+    }
+    if (signals->influence != NULL) {
+        signals->influence->conductance_scale[c] = kept->influence.conductance_scale[c];
+        signals->influence->leak_conductance[c] = kept->influence.leak_conductance[c];
+        signals->influence->extra_volume_m3[c] = kept->influence.extra_volume_m3[c];
+        copy3(signals->influence->coupling[c], kept->influence.coupling[c]);
+    }
+}
+
+static void run_one(struct effect *effect, effect_hook hook, struct effect_signals *signals) {
+    struct per_chamber kept;
+    if (effect->chamber > 0) {
+        keep(&kept, signals);
+    }
+    hook(effect->state, effect->parameter, signals);
+    for (size_t c = 0; c < 3 && effect->chamber > 0; c++) {
+        if (c + 1 != effect->chamber) {
+            put_back(signals, &kept, c);
+        }
+    }
+}
+
+void effects_run(struct effect *effect, size_t count, enum effect_hook_kind hook, struct effect_signals *signals) {
+    for (size_t i = 0; i < count; i++) {
+        const effect_hook call = hook_of(effect[i].kind, hook);
+        if (call != NULL && signals->time_s >= effect[i].onset_s) {
+            run_one(&effect[i], call, signals);
+        }
+    }
+}
+
+void effect_shape_at(const struct effect_signals *signals, const double load_pa[3], struct body_shape *shape) {
+    body_shape_at(signals->table, load_pa, shape);
+}
+
 void effect_init(struct effect *effect, const struct effect_kind *kind) {
     memset(effect, 0, sizeof *effect);
     effect->kind = kind;
+    effect->chamber = kind->scope == EFFECT_ONE_CHAMBER ? 1 : 0;
     for (size_t i = 0; i < kind->parameter_count; i++) {
         effect->parameter[i] = kind->parameter[i].typical;
     }
 }
 
-static bool set_parameter(struct effect *effect, const char *name, const char *text, char *error, size_t bytes) {
-    for (size_t i = 0; i < effect->kind->parameter_count; i++) {
-        const struct effect_parameter *parameter = &effect->kind->parameter[i];
-        if (strcmp(parameter->name, name) != 0) {
-            continue;
-        }
-        char *end = NULL;
-        const double value = strtod(text, &end);
-        if (end == text || *end != '\0' || !(value >= parameter->least) || !(value <= parameter->most)) {
-            (void)snprintf(error, bytes, "effect %s: %s takes %g to %g %s, not '%s'", effect->kind->name, name,
-                           parameter->least, parameter->most, parameter->unit, text);
-            return false;
-        }
-        effect->parameter[i] = value;
-        return true;
+/* A number within bounds, or a message. */
+static bool read_value(const char *text, const char *what, const char *name, double least, double most, const char *unit,
+                       double *value, char *error, size_t bytes) {
+    char *end = NULL;
+    *value = strtod(text, &end);
+    if (end == text || *end != '\0' || !(*value >= least) || !(*value <= most)) {
+        (void)snprintf(error, bytes, "effect %s: %s takes %g to %g %s, not '%s'", what, name, least, most, unit, text);
+        return false;
     }
-    (void)snprintf(error, bytes, "effect %s has no parameter '%s'", effect->kind->name, name);
+    return true;
+}
+
+static bool set_chamber(struct effect *effect, const char *text, char *error, size_t bytes) {
+    double value;
+    if (effect->kind->scope == EFFECT_GLOBAL) {
+        (void)snprintf(error, bytes, "effect %s is not of a single chamber", effect->kind->name);
+        return false;
+    }
+    const double least = effect->kind->scope == EFFECT_ONE_CHAMBER ? 1.0 : 0.0;
+    if (!read_value(text, effect->kind->name, "chamber", least, 3.0, "1", &value, error, bytes)) {
+        return false;
+    }
+    effect->chamber = (size_t)lround(value);
+    return true;
+}
+
+static bool set_parameter(struct effect *effect, const char *name, const char *text, char *error, size_t bytes) {
+    const struct effect_kind *kind = effect->kind;
+    if (strcmp(name, "chamber") == 0) {
+        return set_chamber(effect, text, error, bytes);
+    }
+    if (strcmp(name, "onset") == 0) {
+        return read_value(text, kind->name, name, 0.0, 1e6, "s", &effect->onset_s, error, bytes);
+    }
+    for (size_t i = 0; i < kind->parameter_count; i++) {
+        const struct effect_parameter *parameter = &kind->parameter[i];
+        if (strcmp(parameter->name, name) == 0) {
+            return read_value(text, kind->name, name, parameter->least, parameter->most, parameter->unit,
+                              &effect->parameter[i], error, bytes);
+        }
+    }
+    (void)snprintf(error, bytes, "effect %s has no parameter '%s'", kind->name, name);
     return false;
 }
 

@@ -1,8 +1,10 @@
 /* An effect: something real that the nominal plant leaves out. One file each under effects/, which registers itself;
  * adding one touches no other file.
  *
- * An effect acts on one stage of the plant. In each step of that stage it sees the plant's signals and may change them
- * in place. It owns a state of fixed size, zeroed at the start, and at most three bounded parameters. */
+ * An effect has hooks on the way from duty to tip pose. Each hook sees the plant's signals and may change, in place, the
+ * one that its comment names. Hooks are called in the order of time; the hooks of one effect share its state, which is
+ * of fixed size and zero at the start. An effect has at most three bounded parameters; with its parameters at `none` it
+ * changes nothing. The framework keeps an effect to one chamber and to the time after its onset. */
 #ifndef TRIBEND_SIM_EFFECT_H
 #define TRIBEND_SIM_EFFECT_H
 
@@ -13,12 +15,23 @@
 #include "sim/chamber.h"
 
 #define EFFECT_PARAMETERS_MAX 3
-#define EFFECT_STATE_DOUBLES 64
+#define EFFECT_STATE_DOUBLES 320
 
+/* Where the effect lies; the words of reports. */
 enum effect_stage {
-    EFFECT_STAGE_GAS,  /* signals: influence on supply, valves and leaks */
-    EFFECT_STAGE_BODY, /* signals: shape */
-    EFFECT_STAGE_TIP   /* signals: pose */
+    EFFECT_STAGE_SUPPLY,
+    EFFECT_STAGE_VALVE,
+    EFFECT_STAGE_PRESSURE_SENSOR,
+    EFFECT_STAGE_BODY,
+    EFFECT_STAGE_TIP_SENSOR,
+    EFFECT_STAGE_COUNT
+};
+
+/* Which chambers an effect can be confined to. */
+enum effect_scope {
+    EFFECT_GLOBAL,       /* has nothing to do with single chambers */
+    EFFECT_EVERY_CHAMBER, /* on all of them, or on one */
+    EFFECT_ONE_CHAMBER   /* always on one */
 };
 
 struct effect_parameter {
@@ -27,40 +40,78 @@ struct effect_parameter {
     double least;
     double most;
     double typical;
+    double none; /* the value at which the effect is gone, or NAN where another parameter decides that */
 };
 
 struct effect_signals {
     double time_s;
     double step_s;
-    const double *pressure_pa;           /* [3], true chamber pressures */
-    struct chamber_influence *influence; /* EFFECT_STAGE_GAS */
-    struct body_shape *shape;            /* EFFECT_STAGE_BODY */
-    struct tip_pose *pose;               /* EFFECT_STAGE_TIP */
+    double temperature_k; /* NAN: not known */
+    double chance;        /* uniform in (0, 1), new at each tip sample */
+    const struct bend_table *table;
+    double stiffness_scale;
+    const double *pressure_pa;           /* [3] true chamber pressures */
+    double supply_flow_kgps;             /* drawn from the supply, mean over the last step */
+    double *duty;                        /* [3] command hook */
+    double *late_s;                      /* [3] command hook: by how much each valve sees its period late */
+    struct chamber_influence *influence; /* gas hook */
+    double *reading_pa;                  /* [3] reading hook: what noise-free sensors show */
+    double *load_pa;                     /* [3] load hook: pressures that bend the module, on the table's scale */
+    struct body_shape *shape;            /* shape hook */
+    struct tip_pose *pose;               /* pose hook */
 };
+
+typedef void (*effect_hook)(double *state, const double *parameter, struct effect_signals *signals);
 
 struct effect_kind {
     const char *name;
-    const char *what; /* one sentence */
+    const char *what;      /* one sentence */
+    const char *signature; /* what it leaves in a recording, and what it may be taken for */
     enum effect_stage stage;
+    enum effect_scope scope;
+    bool by_chance; /* parameter 0 is the probability that it acts at a tip sample (signals->chance below it) */
     size_t parameter_count;
     struct effect_parameter parameter[EFFECT_PARAMETERS_MAX];
-    void (*step)(double *state, const double *parameter, struct effect_signals *signals);
+    effect_hook command; /* at the start of a PWM period */
+    effect_hook gas;     /* before each step of the gas */
+    effect_hook reading; /* after each step of the gas */
+    effect_hook load;    /* at each tip sample, before the table is asked */
+    effect_hook shape;   /* then, with the table's answer */
+    effect_hook pose;    /* then, with the tip pose */
 };
 
 /* An effect in use. */
 struct effect {
     const struct effect_kind *kind;
+    size_t chamber; /* 1 to 3: on that one only; 0: on all */
+    double onset_s; /* nothing happens before */
     double parameter[EFFECT_PARAMETERS_MAX];
     double state[EFFECT_STATE_DOUBLES];
+};
+
+enum effect_hook_kind {
+    EFFECT_HOOK_COMMAND,
+    EFFECT_HOOK_GAS,
+    EFFECT_HOOK_READING,
+    EFFECT_HOOK_LOAD,
+    EFFECT_HOOK_SHAPE,
+    EFFECT_HOOK_POSE
 };
 
 void effect_register(const struct effect_kind *kind);
 size_t effect_kind_count(void);
 const struct effect_kind *effect_kind_at(size_t index); /* sorted by name */
 const struct effect_kind *effect_kind_find(const char *name);
+const char *effect_stage_name(enum effect_stage stage);
 void effect_init(struct effect *effect, const struct effect_kind *kind);
-/* "NAME" or "NAME:parameter=value,parameter=value" in SI units. False: `error` says what is wrong. */
+/* "NAME" or "NAME:parameter=value,parameter=value" in SI units; chamber=N and onset=SECONDS as well. False: `error` says
+ * what is wrong. */
 bool effect_parse(const char *text, struct effect *effect, char *error, size_t error_bytes);
+bool effect_has(const struct effect_kind *kind, enum effect_hook_kind hook);
+/* Call that hook of each effect that has it, within its chamber and after its onset. */
+void effects_run(struct effect *effect, size_t count, enum effect_hook_kind hook, struct effect_signals *signals);
+/* For load and shape hooks: the nominal shape at these pressures, on the table's scale. */
+void effect_shape_at(const struct effect_signals *signals, const double load_pa[3], struct body_shape *shape);
 
 /* Register `kind` before main() runs. */
 #define EFFECT_REGISTER(kind)                                                                                       \

@@ -4,72 +4,41 @@
 #include <string.h>
 
 void sim_default_parameters(struct sim_parameters *parameters) {
-    *parameters = (struct sim_parameters){
-        .gas = {.ambient_pa_abs = 101325.0,
-                .temperature_k = 293.15,
-                .gas_constant = 287.0,
-                .sonic_conductance = 2e-10,
-                .reference_density_kgpm3 = 1.185,
-                .critical_ratio = 0.3,
-                .tube_volume_m3 = 2e-6},
-        .valve = {.period_us = 10000, .open_delay_us = 1500, .close_delay_us = 1000},
-        .sensor = {.pressure_noise_pa = 150.0,
-                   .pressure_range_pa = 50000.0,
-                   .pressure_step_pa = 50000.0 / 4095.0,
-                   .tip_period_us = 10000,
-                   .tip_delay_us = 10000,
-                   .tip_position_noise_m = 2e-5,
-                   .tip_angle_noise_rad = 0.012 * M_PI / 180.0,
-                   .tip_position_step_m = 1.1e-4,
-                   .tip_angle_step_rad = 0.022 * M_PI / 180.0},
-        .supply_pa = 40000.0,
-        .step_us = 1000};
+    *parameters = (struct sim_parameters){.sensor = {.pressure_noise_pa = 150.0,
+                                                     .pressure_range_pa = 50000.0,
+                                                     .pressure_step_pa = 50000.0 / 4095.0,
+                                                     .tip_period_us = 10000,
+                                                     .tip_delay_us = 10000,
+                                                     .tip_position_noise_m = 2e-5,
+                                                     .tip_angle_noise_rad = 0.012 * M_PI / 180.0,
+                                                     .tip_position_step_m = 1.1e-4,
+                                                     .tip_angle_step_rad = 0.022 * M_PI / 180.0},
+                                          .step_us = 1000};
+    plant_default_parameters(&parameters->plant);
 }
 
 void sim_init(struct sim *sim, const struct bend_table *table, const struct sim_parameters *parameters, uint64_t seed) {
     memset(sim, 0, sizeof *sim);
     sim->table = table;
     sim->parameters = *parameters;
-    chambers_init(&sim->chambers, &parameters->gas, table);
+    plant_init(&sim->plant, table, &parameters->plant);
     for (uint64_t c = 0; c < 3; c++) {
-        valve_init(&sim->valve[c]);
         random_seed(&sim->pressure_random[c], seed, 1 + c);
     }
     random_seed(&sim->tip_random, seed, 4);
-    body_shape_of(table, &sim->chambers, &sim->shape);
-    body_tip_pose(&table->module, &sim->shape, &sim->pose);
+    random_seed(&sim->chance_random, seed, 5);
 }
 
 bool sim_add_effect(struct sim *sim, const struct effect *effect) {
-    if (sim->effect_count == SIM_EFFECTS_MAX) {
-        return false;
-    }
-    sim->effect[sim->effect_count++] = *effect;
-    return true;
-}
-
-static void run_effects(struct sim *sim, enum effect_stage stage, int64_t step_us) {
-    struct effect_signals signals = {.time_s = 1e-6 * (double)sim->time_us,
-                                     .step_s = 1e-6 * (double)step_us,
-                                     .pressure_pa = sim->chambers.pressure_pa,
-                                     .influence = &sim->influence,
-                                     .shape = &sim->shape,
-                                     .pose = &sim->pose};
-    for (size_t i = 0; i < sim->effect_count; i++) {
-        if (sim->effect[i].kind->stage == stage) {
-            sim->effect[i].kind->step(sim->effect[i].state, sim->effect[i].parameter, &signals);
-        }
-    }
+    return plant_add_effect(&sim->plant, effect);
 }
 
 /* The body is quasi-static: it is only looked up when a sample is taken, with effects stepping over the time between. */
 static void sample_tip(struct sim *sim) {
     struct hal_tip_sample sample;
-    body_shape_of(sim->table, &sim->chambers, &sim->shape);
-    run_effects(sim, EFFECT_STAGE_BODY, sim->parameters.sensor.tip_period_us);
-    body_tip_pose(&sim->table->module, &sim->shape, &sim->pose);
-    run_effects(sim, EFFECT_STAGE_TIP, sim->parameters.sensor.tip_period_us);
-    sensor_tip(&sim->parameters.sensor, &sim->pose, sim->time_us, &sim->tip_random, &sample);
+    plant_sample_tip(&sim->plant, NULL, 1e-6 * (double)sim->time_us,
+                     1e-6 * (double)sim->parameters.sensor.tip_period_us, random_uniform(&sim->chance_random));
+    sensor_tip(&sim->parameters.sensor, &sim->plant.pose, sim->time_us, &sim->tip_random, &sample);
     if (sim->faults.tip_stops) {
         return;
     }
@@ -82,21 +51,18 @@ static void sample_tip(struct sim *sim) {
 }
 
 static void start_periods(struct sim *sim) {
-    for (size_t c = 0; c < 3; c++) {
-        valve_start_period(&sim->valve[c], &sim->parameters.valve, sim->time_us,
-                           sim->outputs.valves_enabled ? (double)sim->outputs.duty[c] : 0.0);
+    double duty[3] = {0.0, 0.0, 0.0};
+    for (size_t c = 0; c < 3 && sim->outputs.valves_enabled; c++) {
+        duty[c] = (double)sim->outputs.duty[c];
     }
+    plant_start_period(&sim->plant, sim->time_us, duty);
 }
 
 static void step(struct sim *sim) {
     const int64_t to_us = sim->time_us + sim->parameters.step_us;
-    sim->influence = (struct chamber_influence){
-        .conductance_scale = {1.0, 1.0, 1.0}, .leak_conductance = {0.0, 0.0, 0.0}, .supply_pa = sim->parameters.supply_pa};
-    run_effects(sim, EFFECT_STAGE_GAS, sim->parameters.step_us);
-    chambers_step(&sim->chambers, &sim->parameters.gas, sim->table, sim->valve, &sim->influence,
-                  sim->outputs.supply_enabled, sim->time_us, to_us);
+    plant_step(&sim->plant, sim->outputs.supply_enabled, sim->time_us, to_us);
     sim->time_us = to_us;
-    if (to_us % sim->parameters.valve.period_us == 0) {
+    if (to_us % sim->parameters.plant.valve.period_us == 0) {
         start_periods(sim);
     }
     if (to_us % sim->parameters.sensor.tip_period_us == 0) {
@@ -123,11 +89,11 @@ static bool hal_read_pressures(void *context, struct hal_pressures *pressures) {
     }
     for (size_t c = 0; c < 3; c++) {
         const double reading_pa =
-            sensor_pressure(&sim->parameters.sensor, sim->chambers.pressure_pa[c], &sim->pressure_random[c]);
+            sensor_pressure(&sim->parameters.sensor, sim->plant.reading_pa[c], &sim->pressure_random[c]);
         pressures->chamber_pa[c] = sim->faults.reading_replaced[c] ? sim->faults.reading_pa[c] : (float)reading_pa;
         pressures->chamber_ok[c] = !sim->faults.channel_fails[c];
     }
-    pressures->supply_pa = (float)sim->parameters.supply_pa;
+    pressures->supply_pa = (float)sim->plant.influence.supply_pa;
     pressures->supply_ok = true;
     return true;
 }
@@ -150,7 +116,7 @@ static bool hal_write_outputs(void *context, const struct hal_outputs *outputs) 
     }
     sim->outputs = *outputs;
     for (size_t c = 0; c < 3 && !outputs->valves_enabled; c++) {
-        valve_cut(&sim->valve[c], &sim->parameters.valve, sim->time_us);
+        valve_cut(&sim->plant.valve[c], &sim->parameters.plant.valve, sim->time_us);
     }
     return true;
 }

@@ -6,17 +6,14 @@
 #define TRIBEND_SIM_HAL_H
 
 #include "hal.h"
-#include "sim/effect.h"
+#include "sim/plant.h"
 #include "sim/sensors.h"
 
-#define SIM_EFFECTS_MAX 8
 #define SIM_TIP_QUEUE 8
 
 struct sim_parameters {
-    struct gas_parameters gas;
-    struct valve_parameters valve;
+    struct plant_parameters plant;
     struct sensor_parameters sensor;
-    double supply_pa;
     int64_t step_us; /* of integration; a divisor of the control step */
 };
 
@@ -34,17 +31,12 @@ struct sim {
     const struct bend_table *table;
     struct sim_parameters parameters;
     struct sim_faults faults;
-    struct effect effect[SIM_EFFECTS_MAX];
-    size_t effect_count;
+    struct plant plant;
     int64_t time_us;
     struct hal_outputs outputs;      /* written last */
-    struct valve valve[3];
-    struct chambers chambers;
-    struct chamber_influence influence;
-    struct body_shape shape;
-    struct tip_pose pose;            /* true, now */
     struct random_stream pressure_random[3];
     struct random_stream tip_random;
+    struct random_stream chance_random;
     struct hal_tip_sample queue[SIM_TIP_QUEUE]; /* measured, not arrived or not read yet, oldest first */
     size_t queued;
     uint32_t tip_dropped;            /* samples that nobody read in time */

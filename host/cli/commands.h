@@ -24,7 +24,7 @@ struct bus_options {
     uint64_t seed;
     double duration_s;
     bool quiet;
-    struct effect effect[SIM_EFFECTS_MAX];
+    struct effect effect[PLANT_EFFECTS_MAX];
     size_t effect_count;
     struct sim_drill drill;
 };

@@ -47,8 +47,8 @@ static void parse_seed(struct argp_state *state, const char *text, struct bus_op
 
 static void parse_effect(struct argp_state *state, const char *text, struct bus_options *options) {
     char error[PROGRAM_ERROR_BYTES];
-    if (options->effect_count == SIM_EFFECTS_MAX) {
-        argp_error(state, "--effect: at most %d effects", SIM_EFFECTS_MAX);
+    if (options->effect_count == PLANT_EFFECTS_MAX) {
+        argp_error(state, "--effect: at most %d effects", PLANT_EFFECTS_MAX);
     } else if (!effect_parse(text, &options->effect[options->effect_count++], error, sizeof error)) {
         argp_error(state, "--effect: %s", error);
     }

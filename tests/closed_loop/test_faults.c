@@ -35,7 +35,7 @@ static int expect_fault(struct rig *rig, enum supervisor_fault fault, int within
         assert_false(rig_fills(rig));
         assert_false(rig->sim.sim.outputs.supply_enabled);
         assert_int_equal(rig->report.status.state, SUPERVISOR_FAULT);
-        const double *p = rig->sim.sim.chambers.pressure_pa;
+        const double *p = rig->sim.sim.plant.chambers.pressure_pa;
         const double highest_pa = fmax(fmax(p[0], p[1]), p[2]);
         assert_true(highest_pa <= before_pa + 1.0);
         before_pa = highest_pa;
@@ -148,7 +148,7 @@ static void tip_lost(void **state) {
         const double wanted_x = (double)rig.command.bend_rad * cos((double)rig.command.direction_rad);
         const double wanted_y = (double)rig.command.bend_rad * sin((double)rig.command.direction_rad);
         struct body_shape shape;
-        body_shape_of(&rig_file.table, &rig.sim.sim.chambers, &shape);
+        body_shape_of(&rig_file.table, &rig.sim.sim.plant.chambers, &shape);
         assert_under(hypot(shape.bend_x_rad - wanted_x, shape.bend_y_rad - wanted_y) * 180.0 / M_PI, 1.5);
         /* and the loop closes again when samples come back */
         rig.sim.sim.faults.tip_stops = false;

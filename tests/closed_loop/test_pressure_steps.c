@@ -13,11 +13,11 @@ static double full_flow_ms(double from_pa, double to_pa) {
     struct sim_parameters parameters;
     struct chambers chambers;
     const bool up = to_pa > from_pa;
-    const struct valve open[3] = {{0, INT64_MAX}, {0, 0}, {0, 0}}, shut[3] = {{0, 0}, {0, 0}, {0, 0}};
+    const struct valve open[3] = {{{{0, INT64_MAX}}, 1}, {.count = 0}, {.count = 0}}, shut[3] = {{.count = 0}, {.count = 0}, {.count = 0}};
     sim_default_parameters(&parameters);
     const struct chamber_influence influence = {.conductance_scale = {1.0, 1.0, 1.0},
-                                                .supply_pa = parameters.supply_pa};
-    chambers_init(&chambers, &parameters.gas, &rig_file.table);
+                                                .supply_pa = parameters.plant.supply_pa};
+    chambers_init(&chambers, &parameters.plant.gas, &rig_file.table);
     int64_t start_us = -1, at_us = 0;
     for (const int64_t step_us = 100; at_us < 20000000; at_us += step_us) {
         const bool filling = up || start_us < 0;
@@ -28,7 +28,7 @@ static double full_flow_ms(double from_pa, double to_pa) {
             break;
         }
         const bool fills = filling && !(start_us >= 0 && !up);
-        chambers_step(&chambers, &parameters.gas, &rig_file.table, fills ? open : shut, &influence, true, at_us,
+        chambers_step(&chambers, &parameters.plant.gas, &rig_file.table, fills ? open : shut, &influence, true, at_us,
                       at_us + step_us);
     }
     return 1e-3 * (double)(at_us - start_us);
@@ -40,11 +40,11 @@ static double forced_ripple_pa(double pressure_pa) {
     struct sim_parameters parameters;
     struct chambers chambers;
     sim_default_parameters(&parameters);
-    const struct gas_parameters *gas = &parameters.gas;
+    const struct gas_parameters *gas = &parameters.plant.gas;
     chambers_init(&chambers, gas, &rig_file.table);
-    const struct valve shut[3] = {{0, 0}, {0, 0}, {0, 0}}, open[3] = {{0, INT64_MAX}, {0, 0}, {0, 0}};
+    const struct valve shut[3] = {{.count = 0}, {.count = 0}, {.count = 0}}, open[3] = {{{{0, INT64_MAX}}, 1}, {.count = 0}, {.count = 0}};
     const struct chamber_influence influence = {.conductance_scale = {1.0, 1.0, 1.0},
-                                                .supply_pa = parameters.supply_pa};
+                                                .supply_pa = parameters.plant.supply_pa};
     double rate[2] = {0.0, 0.0};
     while (chambers.pressure_pa[0] < pressure_pa) {
         chambers_step(&chambers, gas, &rig_file.table, open, &influence, true, 0, 100);
@@ -77,7 +77,7 @@ static struct response step_response(double from_pa, double to_pa, uint64_t seed
     double least = 1e9, most = -1e9, lowest = 1e9, highest = -1e9;
     for (int ms = 1; ms <= 4000; ms++) {
         rig_step(&rig);
-        const double pressure_pa = rig.sim.sim.chambers.pressure_pa[0];
+        const double pressure_pa = rig.sim.sim.plant.chambers.pressure_pa[0];
         if (fabs(pressure_pa - to_pa) > BAND_PA) {
             response.settle_ms = ms;
         }
@@ -158,7 +158,7 @@ static void three_chambers_settle_together(void **state) {
     for (int i = 0; i < 1000; i++) {
         rig_step(&rig);
         for (size_t c = 0; c < 3; c++) {
-            assert_close(rig.sim.sim.chambers.pressure_pa[c], (double)command.pressure_pa[c], BAND_PA);
+            assert_close(rig.sim.sim.plant.chambers.pressure_pa[c], (double)command.pressure_pa[c], BAND_PA);
         }
     }
 }
@@ -171,7 +171,7 @@ static void a_pressure_over_the_working_limit_is_cut_and_flagged(void **state) {
     rig_command(&rig, &command);
     rig_run(&rig, 3000);
     assert_true((rig.report.status.warnings & (1u << WARNING_COMMAND_LIMITED)) != 0u);
-    assert_close(rig.sim.sim.chambers.pressure_pa[0], (double)rig_file.table.module.working_pressure_pa, 250.0);
+    assert_close(rig.sim.sim.plant.chambers.pressure_pa[0], (double)rig_file.table.module.working_pressure_pa, 250.0);
     assert_int_equal(rig.report.status.faults, 0);
 }
 
@@ -180,13 +180,13 @@ static void the_observer_learns_a_wrong_conductance(void **state) {
     static struct rig rig;
     const struct controller_command command = rig_pressure(6000.0, 0.0, 0.0);
     rig_start(&rig, &rig_file.table, 10);
-    rig.sim.sim.parameters.gas.sonic_conductance *= 0.85; /* valve and tube let less through than the firmware thinks */
+    rig.sim.sim.plant.parameters.gas.sonic_conductance *= 0.85; /* valve and tube let less through than the firmware thinks */
     rig_command(&rig, &command);
     rig_run(&rig, 3000);
     double mean_pa = 0.0;
     for (int i = 0; i < 1000; i++) {
         rig_step(&rig);
-        mean_pa += rig.sim.sim.chambers.pressure_pa[0] / 1000.0;
+        mean_pa += rig.sim.sim.plant.chambers.pressure_pa[0] / 1000.0;
     }
     assert_close(mean_pa, 6000.0, 60.0);
 }

@@ -19,9 +19,9 @@ static struct error steady_error(struct rig *rig, const struct controller_comman
     for (int i = 0; i < WINDOW_MS; i++) {
         struct body_shape shape;
         rig_step(rig);
-        body_shape_of(rig->sim.sim.table, &rig->sim.sim.chambers, &shape);
-        for (size_t e = 0; e < rig->sim.sim.effect_count; e++) {
-            shape = rig->sim.sim.shape; /* an effect bends the body too: as it was at the last tip sample */
+        body_shape_of(rig->sim.sim.table, &rig->sim.sim.plant.chambers, &shape);
+        for (size_t e = 0; e < rig->sim.sim.plant.effect_count; e++) {
+            shape = rig->sim.sim.plant.shape; /* an effect bends the body too: as it was at the last tip sample */
         }
         const double bend = DEGREES * (hypot(shape.bend_x_rad, shape.bend_y_rad) - (double)command->bend_rad);
         const double turn = DEGREES * remainder(atan2(shape.bend_y_rad, shape.bend_x_rad) -
@@ -91,7 +91,7 @@ static void an_unreachable_bend_stops_at_the_limit_and_says_so(void **state) {
     for (int i = 0; i < 4000; i++) {
         rig_step(&rig);
         for (size_t c = 0; c < 3; c++) {
-            assert_under(rig.sim.sim.chambers.pressure_pa[c], (double)rig_file.table.module.working_pressure_pa * 1.03);
+            assert_under(rig.sim.sim.plant.chambers.pressure_pa[c], (double)rig_file.table.module.working_pressure_pa * 1.03);
         }
     }
     assert_true((rig.report.status.warnings & (1u << WARNING_COMMAND_LIMITED)) != 0u);
@@ -128,8 +128,8 @@ static void hold_keeps_the_pressures(void **state) {
     rig_command(&rig, &hold);
     rig_run(&rig, 2000);
     assert_int_equal(rig.report.status.state, SUPERVISOR_HOLD);
-    assert_close(rig.sim.sim.chambers.pressure_pa[0], 6000.0, 250.0);
-    assert_close(rig.sim.sim.chambers.pressure_pa[1], 3000.0, 250.0);
+    assert_close(rig.sim.sim.plant.chambers.pressure_pa[0], 6000.0, 250.0);
+    assert_close(rig.sim.sim.plant.chambers.pressure_pa[1], 3000.0, 250.0);
 }
 
 static void a_vent_command_empties_every_chamber(void **state) {
@@ -145,7 +145,7 @@ static void a_vent_command_empties_every_chamber(void **state) {
     assert_int_equal(rig.report.status.state, SUPERVISOR_SAFE);
     rig_run(&rig, 4000);
     for (size_t c = 0; c < 3; c++) {
-        assert_under(rig.sim.sim.chambers.pressure_pa[c], 50.0);
+        assert_under(rig.sim.sim.plant.chambers.pressure_pa[c], 50.0);
     }
 }
 
@@ -170,8 +170,8 @@ static void the_same_seed_gives_the_same_bits_another_does_not(void **state) {
         assert_memory_equal(first.report.pressure_pa, second.report.pressure_pa, sizeof first.report.pressure_pa);
         assert_memory_equal(first.report.tip_quaternion, second.report.tip_quaternion,
                             sizeof first.report.tip_quaternion);
-        assert_memory_equal(first.sim.sim.chambers.pressure_pa, second.sim.sim.chambers.pressure_pa,
-                            sizeof first.sim.sim.chambers.pressure_pa);
+        assert_memory_equal(first.sim.sim.plant.chambers.pressure_pa, second.sim.sim.plant.chambers.pressure_pa,
+                            sizeof first.sim.sim.plant.chambers.pressure_pa);
         differs = differs || memcmp(first.report.pressure_pa, other.report.pressure_pa,
                                     sizeof first.report.pressure_pa) != 0;
     }

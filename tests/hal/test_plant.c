@@ -64,7 +64,7 @@ static void mass_flow_is_iso_6358s(void **state) {
     (void)state;
     struct sim_parameters parameters;
     sim_default_parameters(&parameters);
-    const struct gas_parameters *gas = &parameters.gas;
+    const struct gas_parameters *gas = &parameters.plant.gas;
     const double c = gas->sonic_conductance, rho = gas->reference_density_kgpm3;
     /* choked below the critical ratio: C rho p1, at the reference temperature */
     assert_relative(gas_mass_flow(gas, c, 5e5, 1e5), c * rho * 5e5, 1e-12);
@@ -85,7 +85,7 @@ static double rigid(enum bend_table_channel channel, const double pressure_pa[3]
 
 static void fill(struct chambers *chambers, const struct gas_parameters *gas, const struct bend_table *table,
                  double supply_pa, int64_t duration_us, int64_t step_us) {
-    const struct valve open[3] = {{0, INT64_MAX}, {0, 0}, {0, 0}};
+    const struct valve open[3] = {{{{0, INT64_MAX}}, 1}, {.count = 0}, {.count = 0}};
     const struct chamber_influence influence = {.conductance_scale = {1.0, 1.0, 1.0}, .supply_pa = supply_pa};
     for (int64_t at_us = 0; at_us < duration_us; at_us += step_us) {
         chambers_step(chambers, gas, table, open, &influence, true, at_us, at_us + step_us);
@@ -100,7 +100,7 @@ static void a_rigid_chamber_fills_linearly_while_choked(void **state) {
     struct chambers chambers;
     synthetic_table_create(&synthetic, 5, 10000.0, 1.0, rigid);
     sim_default_parameters(&parameters);
-    const struct gas_parameters *gas = &parameters.gas;
+    const struct gas_parameters *gas = &parameters.plant.gas;
     chambers_init(&chambers, gas, &synthetic.table);
     const double supply_pa = 9e5, volume_m3 = gas->tube_volume_m3 + 0.055 * 1e-3;
     assert_relative(chambers.volume_m3[0], volume_m3, 1e-6);
@@ -119,13 +119,13 @@ static void a_chamber_ends_at_the_supply_and_vents_to_ambient(void **state) {
     struct chambers chambers;
     synthetic_table_create(&synthetic, 9, 10000.0, 1.0, synthetic_module);
     sim_default_parameters(&parameters);
-    chambers_init(&chambers, &parameters.gas, &synthetic.table);
-    fill(&chambers, &parameters.gas, &synthetic.table, 6000.0, 5000000, 1000);
+    chambers_init(&chambers, &parameters.plant.gas, &synthetic.table);
+    fill(&chambers, &parameters.plant.gas, &synthetic.table, 6000.0, 5000000, 1000);
     assert_close(chambers.pressure_pa[0], 6000.0, 1.0);
-    const struct valve shut[3] = {{0, 0}, {0, 0}, {0, 0}};
+    const struct valve shut[3] = {{.count = 0}, {.count = 0}, {.count = 0}};
     const struct chamber_influence influence = {.conductance_scale = {1.0, 1.0, 1.0}, .supply_pa = 6000.0};
     for (int64_t at_us = 0; at_us < 5000000; at_us += 1000) {
-        chambers_step(&chambers, &parameters.gas, &synthetic.table, shut, &influence, true, at_us, at_us + 1000);
+        chambers_step(&chambers, &parameters.plant.gas, &synthetic.table, shut, &influence, true, at_us, at_us + 1000);
         assert_true(chambers.pressure_pa[0] > -1.0);
     }
     assert_close(chambers.pressure_pa[0], 0.0, 1.0);
@@ -139,11 +139,11 @@ static void halving_the_step_changes_a_fill_by_little(void **state) {
     struct chambers coarse, fine;
     synthetic_table_create(&synthetic, 9, 20000.0, 1.0, synthetic_module);
     sim_default_parameters(&parameters);
-    chambers_init(&coarse, &parameters.gas, &synthetic.table);
-    chambers_init(&fine, &parameters.gas, &synthetic.table);
+    chambers_init(&coarse, &parameters.plant.gas, &synthetic.table);
+    chambers_init(&fine, &parameters.plant.gas, &synthetic.table);
     for (int i = 0; i < 20; i++) {
-        fill(&coarse, &parameters.gas, &synthetic.table, 40000.0, 1000, 1000);
-        fill(&fine, &parameters.gas, &synthetic.table, 40000.0, 1000, 500);
+        fill(&coarse, &parameters.plant.gas, &synthetic.table, 40000.0, 1000, 1000);
+        fill(&fine, &parameters.plant.gas, &synthetic.table, 40000.0, 1000, 500);
         assert_relative(coarse.pressure_pa[0], fine.pressure_pa[0], 2e-3);
     }
     assert_true(coarse.pressure_pa[0] > 1000.0);
@@ -157,11 +157,11 @@ static void a_shut_supply_gives_no_air(void **state) {
     struct chambers chambers;
     synthetic_table_create(&synthetic, 9, 10000.0, 1.0, synthetic_module);
     sim_default_parameters(&parameters);
-    chambers_init(&chambers, &parameters.gas, &synthetic.table);
-    const struct valve open[3] = {{0, INT64_MAX}, {0, INT64_MAX}, {0, INT64_MAX}};
+    chambers_init(&chambers, &parameters.plant.gas, &synthetic.table);
+    const struct valve open[3] = {{{{0, INT64_MAX}}, 1}, {{{0, INT64_MAX}}, 1}, {{{0, INT64_MAX}}, 1}};
     const struct chamber_influence influence = {.conductance_scale = {1.0, 1.0, 1.0}, .supply_pa = 40000.0};
     for (int64_t at_us = 0; at_us < 1000000; at_us += 1000) {
-        chambers_step(&chambers, &parameters.gas, &synthetic.table, open, &influence, false, at_us, at_us + 1000);
+        chambers_step(&chambers, &parameters.plant.gas, &synthetic.table, open, &influence, false, at_us, at_us + 1000);
     }
     for (size_t c = 0; c < 3; c++) {
         assert_close(chambers.pressure_pa[c], 0.0, 1e-6);
@@ -212,22 +212,22 @@ static void a_snapping_chamber_follows_its_curve_and_comes_back(void **state) {
     struct synthetic_table synthetic;
     struct sim_parameters parameters;
     sim_default_parameters(&parameters);
-    parameters.gas.sonic_conductance *= 0.02;
+    parameters.plant.gas.sonic_conductance *= 0.02;
     synthetic_table_create(&synthetic, 25, 5000.0, 1.0, low_branch);
     synthetic_table_add_ballooned(&synthetic, 25, balloon_m2(4300.0), 2.2e-4, 5000.0, 5340.0f, 1980.0f, ballooned_branch);
     for (size_t c = 0; c < 3; c++) {
         struct chambers chambers;
         struct body_shape shape;
-        struct valve valve[3] = {{0, 0}, {0, 0}, {0, 0}};
+        struct valve valve[3] = {{.count = 0}, {.count = 0}, {.count = 0}};
         const struct chamber_influence influence = {.conductance_scale = {1.0, 1.0, 1.0}, .supply_pa = 40000.0};
         double top_pa = 0.0, least_after_pa = 1e9;
         int64_t at_us = 0;
-        chambers_init(&chambers, &parameters.gas, &synthetic.table);
+        chambers_init(&chambers, &parameters.plant.gas, &synthetic.table);
         assert_true(chambers.snaps);
-        valve[c] = (struct valve){0, INT64_MAX};
+        valve[c] = (struct valve){{{0, INT64_MAX}}, 1};
         for (; chambers.volume_m3[c] < 2e-6 + 0.055 * 2.1e-4; at_us += 1000) {
-            chambers_step(&chambers, &parameters.gas, &synthetic.table, valve, &influence, true, at_us, at_us + 1000);
-            const double volume_m2 = (chambers.volume_m3[c] - parameters.gas.tube_volume_m3) / 0.055;
+            chambers_step(&chambers, &parameters.plant.gas, &synthetic.table, valve, &influence, true, at_us, at_us + 1000);
+            const double volume_m2 = (chambers.volume_m3[c] - parameters.plant.gas.tube_volume_m3) / 0.055;
             assert_close(chambers.pressure_pa[c], balloon_pa(volume_m2), 25.0);
             assert_relative(chambers.gas[c], (101325.0 + chambers.pressure_pa[c]) * chambers.volume_m3[c], 1e-4);
             top_pa = volume_m2 < 1e-4 ? fmax(top_pa, chambers.pressure_pa[c]) : top_pa;
@@ -241,9 +241,9 @@ static void a_snapping_chamber_follows_its_curve_and_comes_back(void **state) {
         const double bend_rad = 0.055 * 1e6 * 1.9e-4, direction_rad = M_PI + (double)c * 2.0 * M_PI / 3.0;
         assert_relative(hypot(shape.bend_x_rad, shape.bend_y_rad), bend_rad, 5e-3);
         assert_close(cos(atan2(shape.bend_y_rad, shape.bend_x_rad) - direction_rad), 1.0, 1e-6);
-        valve[c] = (struct valve){0, 0};
+        valve[c] = (struct valve){.count = 0};
         for (const int64_t end_us = at_us + 240000000; at_us < end_us; at_us += 1000) {
-            chambers_step(&chambers, &parameters.gas, &synthetic.table, valve, &influence, true, at_us, at_us + 1000);
+            chambers_step(&chambers, &parameters.plant.gas, &synthetic.table, valve, &influence, true, at_us, at_us + 1000);
         }
         assert_int_equal(chambers.ballooned, CHAMBERS_NONE);
         for (size_t d = 0; d < 3; d++) {
@@ -295,7 +295,7 @@ static void chamber_one_alone_moves_the_tip_to_minus_x(void **state) {
     struct body_shape shape;
     synthetic_table_create(&synthetic, 9, 10000.0, 1.0, synthetic_module);
     sim_default_parameters(&parameters);
-    chambers_init(&chambers, &parameters.gas, &synthetic.table);
+    chambers_init(&chambers, &parameters.plant.gas, &synthetic.table);
     chambers.coordinate[0] = 5000.0;
     body_shape_of(&synthetic.table, &chambers, &shape);
     assert_relative(shape.bend_x_rad, -0.055 * (1e-3 * 5000.0 + 2e-7 * 2.5e7), 1e-5);
@@ -376,9 +376,9 @@ static void creep_follows_its_closed_form(void **state) {
     char error[256];
     assert_true(effect_parse("creep:amplitude=0.2,time_constant=4", &effect, error, sizeof error));
     for (int i = 1; i <= 1000; i++) {
-        struct body_shape shape = {1.0, -0.5, 1.1};
+        struct body_shape shape = {1.0, -0.5, 1.1, 1.0};
         struct effect_signals signals = {.time_s = 0.01 * i, .step_s = 0.01, .shape = &shape};
-        effect.kind->step(effect.state, effect.parameter, &signals);
+        effect.kind->shape(effect.state, effect.parameter, &signals);
         const double grown = 1.0 + 0.2 * (1.0 - exp(-0.01 * i / 4.0));
         assert_close(shape.bend_x_rad, grown, 1e-12);
         assert_close(shape.bend_y_rad, -0.5 * grown, 1e-12);
@@ -391,9 +391,9 @@ static void an_effect_of_no_size_changes_nothing(void **state) {
     struct effect effect;
     char error[256];
     assert_true(effect_parse("creep:amplitude=0", &effect, error, sizeof error));
-    struct body_shape shape = {1.0, -0.5, 1.1};
+    struct body_shape shape = {1.0, -0.5, 1.1, 1.0};
     struct effect_signals signals = {.time_s = 1.0, .step_s = 0.01, .shape = &shape};
-    effect.kind->step(effect.state, effect.parameter, &signals);
+    effect.kind->shape(effect.state, effect.parameter, &signals);
     assert_true(shape.bend_x_rad == 1.0 && shape.bend_y_rad == -0.5 && shape.stretch == 1.1);
 }
 
@@ -409,7 +409,7 @@ static void misspelt_effects_are_explained(void **state) {
         assert_true(strlen(error) > 20);
     }
     assert_true(effect_kind_count() >= 1);
-    assert_ptr_equal(effect_kind_find("creep"), effect_kind_at(0));
+    assert_non_null(effect_kind_find("creep"));
 }
 
 int main(void) {

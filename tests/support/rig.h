@@ -72,8 +72,8 @@ static inline struct controller_command rig_pressure(double p1_pa, double p2_pa,
 /* Any valve of the plant that still lets air in. */
 static inline bool rig_fills(const struct rig *rig) {
     const struct sim *sim = &rig->sim.sim;
-    return valve_fills(&sim->valve[0], sim->time_us) || valve_fills(&sim->valve[1], sim->time_us) ||
-           valve_fills(&sim->valve[2], sim->time_us);
+    return valve_fills(&sim->plant.valve[0], sim->time_us) || valve_fills(&sim->plant.valve[1], sim->time_us) ||
+           valve_fills(&sim->plant.valve[2], sim->time_us);
 }
 
 #endif

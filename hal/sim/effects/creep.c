@@ -23,10 +23,12 @@ static void step(double *state, const double *parameter, struct effect_signals *
 static const struct effect_kind creep = {
     .name = "creep",
     .what = "the bend under a held pressure grows by a share of itself with one time constant",
+    .signature = "the residual lags the bend, grows over a hold and goes on after venting; no dependence on the path beyond that",
     .stage = EFFECT_STAGE_BODY,
+    .scope = EFFECT_GLOBAL,
     .parameter_count = 2,
-    .parameter = {[AMPLITUDE] = {"amplitude", "1", 0.0, 0.5, 0.1},
-                  [TIME_CONSTANT] = {"time_constant", "s", 0.05, 3600.0, 10.0}},
-    .step = step};
+    .parameter = {[AMPLITUDE] = {"amplitude", "1", 0.0, 0.5, 0.1, 0.0},
+                  [TIME_CONSTANT] = {"time_constant", "s", 0.05, 600.0, 3.0, NAN}},
+    .shape = step};
 
 EFFECT_REGISTER(creep);

@@ -1,0 +1,107 @@
+#include "sim/plant.h"
+
+#include <math.h>
+#include <string.h>
+
+void plant_default_parameters(struct plant_parameters *parameters) {
+    *parameters = (struct plant_parameters){.gas = {.ambient_pa_abs = 101325.0,
+                                                    .temperature_k = 293.15,
+                                                    .gas_constant = 287.0,
+                                                    .sonic_conductance = 2e-10,
+                                                    .reference_density_kgpm3 = 1.185,
+                                                    .critical_ratio = 0.3,
+                                                    .tube_volume_m3 = 2e-6,
+                                                    .stiffness_scale = 1.0},
+                                            .valve = {.period_us = 10000, .open_delay_us = 1500, .close_delay_us = 1000},
+                                            .supply_pa = 40000.0};
+}
+
+static void reset_influence(struct plant *plant) {
+    plant->influence =
+        (struct chamber_influence){.conductance_scale = {1.0, 1.0, 1.0}, .supply_pa = plant->parameters.supply_pa};
+}
+
+void plant_init(struct plant *plant, const struct bend_table *table, const struct plant_parameters *parameters) {
+    memset(plant, 0, sizeof *plant);
+    plant->table = table;
+    plant->parameters = *parameters;
+    plant->temperature_k = NAN;
+    chambers_init(&plant->chambers, &parameters->gas, table);
+    for (size_t c = 0; c < 3; c++) {
+        valve_init(&plant->valve[c]);
+    }
+    reset_influence(plant);
+    body_shape_of(table, &plant->chambers, &plant->shape);
+    body_tip_pose(&table->module, &plant->shape, &plant->pose);
+}
+
+bool plant_add_effect(struct plant *plant, const struct effect *effect) {
+    if (plant->effect_count == PLANT_EFFECTS_MAX) {
+        return false;
+    }
+    plant->effect[plant->effect_count++] = *effect;
+    return true;
+}
+
+static struct effect_signals signals_at(struct plant *plant, double time_s, double step_s) {
+    return (struct effect_signals){.time_s = time_s,
+                                   .step_s = step_s,
+                                   .temperature_k = plant->temperature_k,
+                                   .chance = 1.0,
+                                   .table = plant->table,
+                                   .stiffness_scale = plant->parameters.gas.stiffness_scale,
+                                   .pressure_pa = plant->pressure_pa,
+                                   .supply_flow_kgps = plant->chambers.supply_flow_kgps};
+}
+
+void plant_start_period(struct plant *plant, int64_t time_us, const double duty[3]) {
+    double changed[3] = {duty[0], duty[1], duty[2]}, late_s[3] = {0.0, 0.0, 0.0};
+    struct effect_signals signals =
+        signals_at(plant, 1e-6 * (double)time_us, 1e-6 * (double)plant->parameters.valve.period_us);
+    signals.duty = changed;
+    signals.late_s = late_s;
+    effects_run(plant->effect, plant->effect_count, EFFECT_HOOK_COMMAND, &signals);
+    for (size_t c = 0; c < 3; c++) {
+        valve_start_period(&plant->valve[c], &plant->parameters.valve, time_us, llround(1e6 * late_s[c]), changed[c]);
+    }
+}
+
+void plant_step(struct plant *plant, bool supply_open, int64_t from_us, int64_t to_us) {
+    struct effect_signals signals = signals_at(plant, 1e-6 * (double)from_us, 1e-6 * (double)(to_us - from_us));
+    reset_influence(plant);
+    signals.influence = &plant->influence;
+    effects_run(plant->effect, plant->effect_count, EFFECT_HOOK_GAS, &signals);
+    chambers_step(&plant->chambers, &plant->parameters.gas, plant->table, plant->valve, &plant->influence, supply_open,
+                  from_us, to_us);
+    for (size_t c = 0; c < 3; c++) {
+        plant->pressure_pa[c] = plant->chambers.pressure_pa[c];
+        for (size_t d = 0; d < 3; d++) {
+            plant->pressure_pa[c] += plant->influence.coupling[c][d] * plant->chambers.pressure_pa[d];
+        }
+    }
+    memcpy(plant->reading_pa, plant->pressure_pa, sizeof plant->reading_pa);
+    signals = signals_at(plant, 1e-6 * (double)to_us, 1e-6 * (double)(to_us - from_us));
+    signals.reading_pa = plant->reading_pa;
+    effects_run(plant->effect, plant->effect_count, EFFECT_HOOK_READING, &signals);
+}
+
+void plant_sample_tip(struct plant *plant, const double *pressure_pa, double time_s, double step_s, double chance) {
+    const double scale = plant->parameters.gas.stiffness_scale;
+    const double *pressure = pressure_pa != NULL ? pressure_pa : plant->pressure_pa;
+    double load_pa[3] = {pressure[0] / scale, pressure[1] / scale, pressure[2] / scale};
+    struct effect_signals signals = signals_at(plant, time_s, step_s);
+    signals.chance = chance;
+    signals.pressure_pa = pressure;
+    signals.load_pa = load_pa;
+    effects_run(plant->effect, plant->effect_count, EFFECT_HOOK_LOAD, &signals);
+    if (pressure_pa == NULL && plant->chambers.ballooned != CHAMBERS_NONE) {
+        body_shape_of(plant->table, &plant->chambers, &plant->shape); /* beyond the snap the pressures alone say nothing */
+    } else {
+        body_shape_at(plant->table, load_pa, &plant->shape);
+    }
+    signals.shape = &plant->shape;
+    effects_run(plant->effect, plant->effect_count, EFFECT_HOOK_SHAPE, &signals);
+    body_tip_pose(&plant->table->module, &plant->shape, &plant->pose);
+    signals.pose = &plant->pose;
+    effects_run(plant->effect, plant->effect_count, EFFECT_HOOK_POSE, &signals);
+}
