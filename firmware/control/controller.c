@@ -1,6 +1,6 @@
-/* The order of a step: estimate pressures, look for faults, take the command, let the supervisor decide, compute the
- * targets, write duties. State that lives here: the command being followed and when it came, when the last tip sample
- * came, and each chamber's capacity from the table. */
+/* The order of a step: estimate pressures, look for gaps to the model, learn from the tip, look for faults, take the
+ * command, let the supervisor decide, compute the targets, write duties. State that lives here: the command being
+ * followed and when it came, when the last tip sample came, and each chamber's capacity from the table. */
 #include "control/controller.h"
 
 #include <stddef.h>
@@ -16,6 +16,7 @@ void controller_default_parameters(struct controller_parameters *parameters, con
     pressure_loop_default_parameters(&parameters->pressure_loop);
     tip_loop_default_parameters(&parameters->tip_loop);
     limits_default_parameters(&parameters->limits, table);
+    gap_monitor_default_parameters(&parameters->gap_monitor);
 }
 
 void controller_init(struct controller *controller, const struct bend_table *table,
@@ -24,6 +25,7 @@ void controller_init(struct controller *controller, const struct bend_table *tab
     supervisor_init(&controller->supervisor);
     limits_init(&controller->limits);
     tip_loop_init(&controller->tip_loop);
+    gap_monitor_init(&controller->gap_monitor);
     for (uint32_t c = 0; c < 3u; c++) {
         pressure_loop_init(&controller->pressure_loop[c]);
         controller->capacity_m3[c] = parameters->pressure_loop.nominal_capacity_m3;
@@ -76,6 +78,49 @@ static void estimate(struct controller *controller, const struct controller_inpu
     tip_loop_store(&controller->tip_loop, pressure_pa);
 }
 
+/* --- gap --- */
+
+static void watch_pressures(struct controller *controller, const struct controller_input *input) {
+    struct gap_monitor_pressure pressure[3];
+    for (uint32_t c = 0; c < 3u; c++) {
+        const struct pressure_loop *loop = &controller->pressure_loop[c];
+        pressure[c] = (struct gap_monitor_pressure){
+            .reading_pa = input->pressure_pa[c],
+            .reading_ok = input->pressure_ok[c],
+            .estimate_pa = loop->estimate_pa,
+            .unmodelled_pa = loop->unmodelled_pa,
+            .capacity_m3 = controller->table != NULL ? controller->capacity_m3[c] : 0.0f,
+            .vented_us = input->time_us - loop->close_at_us};
+    }
+    gap_monitor_follow_pressures(&controller->gap_monitor, &controller->parameters.gap_monitor, pressure,
+                                 (float)CONTROLLER_STEP_US * 1e-6f);
+}
+
+static void keep_pose(struct controller *controller, const struct controller_input *input) {
+    const struct tip_loop *loop = &controller->tip_loop;
+    struct gap_monitor_pose *pose = &controller->pose;
+    pose->measured_us = input->tip_measured_us;
+    for (uint32_t i = 0; i < 2u; i++) {
+        pose->bend_rad[i] = loop->measured_rad[i];
+        pose->gap_rad[i] = loop->gap_rad[i];
+    }
+    for (uint32_t i = 0; i < 3u; i++) {
+        pose->position_m[i] = input->tip_position_m[i];
+    }
+    controller->pose_waits = true;
+}
+
+/* Takes the tip sample of the step before: that step had the table to invert. */
+static void watch_gap(struct controller *controller, const struct controller_input *input) {
+    watch_pressures(controller, input);
+    if (controller->pose_waits) {
+        gap_monitor_follow_pose(&controller->gap_monitor, &controller->parameters.gap_monitor, controller->table,
+                                &controller->tip_loop.stencil, &controller->pose);
+        controller->pose_waits = false;
+    }
+    controller->status.gap = controller->gap_monitor.report;
+}
+
 /* --- tip --- */
 
 static void follow_tip(struct controller *controller, const struct controller_input *input) {
@@ -91,6 +136,9 @@ static void follow_tip(struct controller *controller, const struct controller_in
             controller->tip_us = input->time_us;
             controller->tip_lost = false;
             controller->targets_stale = true;
+        }
+        if (good && controller->tip_loop.compared) {
+            keep_pose(controller, input);
         }
     }
     const bool overdue = input->time_us - controller->tip_us >= parameters->tip_period_us + parameters->tip_overdue_us;
@@ -257,6 +305,7 @@ static void drive(struct controller *controller, const struct controller_input *
 void controller_step(struct controller *controller, const struct controller_input *input,
                      struct controller_output *output) {
     estimate(controller, input);
+    watch_gap(controller, input);
     follow_tip(controller, input);
     supervise(controller, input);
     aim(controller);
@@ -268,5 +317,6 @@ void controller_step(struct controller *controller, const struct controller_inpu
     status->faults = controller->supervisor.faults;
     status->warnings = (controller->tip_lost ? 1u << WARNING_TIP_LOST : 0u) |
                        (controller->table == NULL ? 1u << WARNING_NO_TABLE : 0u) |
-                       (status->inverse.flags != 0u ? 1u << WARNING_COMMAND_LIMITED : 0u);
+                       (status->inverse.flags != 0u ? 1u << WARNING_COMMAND_LIMITED : 0u) |
+                       (status->gap.stage != GAP_MONITOR_NONE ? 1u << WARNING_MODEL_GAP : 0u);
 }

@@ -9,6 +9,7 @@
 #include "control/bend_table.h"
 #include "control/pressure_loop.h"
 #include "control/tip_loop.h"
+#include "safety/gap_monitor.h"
 #include "safety/limits.h"
 #include "safety/supervisor.h"
 
@@ -41,6 +42,7 @@ struct controller_parameters {
     struct pressure_loop_parameters pressure_loop;
     struct tip_loop_parameters tip_loop;
     struct limits_parameters limits;
+    struct gap_monitor_parameters gap_monitor;
 };
 
 struct controller_input {
@@ -79,6 +81,7 @@ struct controller_status {
     uint32_t tip_rejected;
     uint32_t tip_lost_count;
     uint32_t commands_refused;
+    struct gap_monitor_report gap;
 };
 
 struct controller {
@@ -90,6 +93,9 @@ struct controller {
     struct limits limits;
     struct pressure_loop pressure_loop[3];
     struct tip_loop tip_loop;
+    struct gap_monitor gap_monitor;
+    struct gap_monitor_pose pose; /* the last good tip sample, for the gap monitor */
+    bool pose_waits;              /* for the next step to take it */
     struct controller_command active;
     int64_t command_us;
     int64_t tip_us;

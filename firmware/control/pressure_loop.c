@@ -86,7 +86,10 @@ void pressure_loop_predict(struct pressure_loop *loop, const struct pressure_loo
     float fill = 0.0f, vent = 0.0f;
     rates(loop, parameters, loop->estimate_pa, supply_pa, capacity_m3, &fill, &vent);
     loop->estimate_pa += (float)step_us * SECONDS_PER_US * (share * fill - (1.0f - share) * vent);
+    const float bias_pa = (float)step_us * SECONDS_PER_US * loop->bias / real_max(capacity_m3, CAPACITY_LEAST_M3);
+    const float modelled_pa = real_max(loop->estimate_pa - bias_pa, 0.0f);
     loop->estimate_pa = real_max(loop->estimate_pa, 0.0f);
+    loop->unmodelled_pa = loop->estimate_pa - modelled_pa;
     if (time_us % parameters->pwm_period_us == 0) {
         start_period(loop, parameters, time_us); /* with the duty of the step before: this one's comes too late */
     }
@@ -98,12 +101,15 @@ void pressure_loop_correct(struct pressure_loop *loop, const struct pressure_loo
     const float innovation_pa = measured_pa - loop->estimate_pa;
     if (loop->estimate_pa < clip_pa && measured_pa < 1.5f * clip_pa) {
         loop->innovation_pa = 0.0f;
+        loop->unmodelled_pa = 0.0f;
         return;
     }
     loop->innovation_pa += INNOVATION_SHARE * (innovation_pa - loop->innovation_pa);
     const bool off = real_abs(loop->innovation_pa) > INNOVATION_SIGMAS * parameters->sensor_noise_pa;
+    const float predicted_pa = loop->estimate_pa;
     loop->estimate_pa += (off ? parameters->gain_fast : parameters->gain) * innovation_pa;
     loop->estimate_pa = real_max(loop->estimate_pa, 0.0f);
+    loop->unmodelled_pa += loop->estimate_pa - predicted_pa;
     loop->bias += parameters->bias_gain_per_s * (float)step_us * SECONDS_PER_US * innovation_pa * capacity_m3;
     loop->bias = real_clamp(loop->bias, -parameters->bias_limit, parameters->bias_limit);
 }

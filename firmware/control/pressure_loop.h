@@ -31,6 +31,7 @@ struct pressure_loop {
     float estimate_pa;
     float bias;           /* p V flow that the model does not know, Pa m3/s */
     float innovation_pa;  /* averaged over some 16 samples */
+    float unmodelled_pa;  /* change of the estimate in this step that valve and gas do not explain: bias and readings */
     float duty;           /* of the period under way */
     float duty_next;      /* written, taken over at the next period */
     int64_t open_at_us;   /* the valve fills from here ... */

@@ -20,6 +20,9 @@ struct tip_loop_parameters {
 struct tip_loop {
     float correction_rad[2];     /* measured minus predicted bend vector */
     float measured_rad[2];       /* of the last good sample */
+    float gap_rad[2];            /* of the last sample that was compared: measured minus predicted */
+    struct bend_table_stencil stencil; /* where the table was asked for it */
+    bool compared;               /* the last good sample was compared */
     float history_pa[TIP_LOOP_HISTORY][3];
     uint32_t newest;
     uint32_t stored;

@@ -91,6 +91,7 @@ const char *supervisor_warning_text(enum supervisor_warning warning) {
     static const char *const texts[WARNING_COUNT] = {
         [WARNING_TIP_LOST] = "tip sensor lost: the bend runs open loop",
         [WARNING_NO_TABLE] = "no valid bend table: pressure commands only",
-        [WARNING_COMMAND_LIMITED] = "the command was out of reach: the nearest reachable one is followed"};
+        [WARNING_COMMAND_LIMITED] = "the command was out of reach: the nearest reachable one is followed",
+        [WARNING_MODEL_GAP] = "the module does not do what its model says: the gap monitor names the stage"};
     return (uint32_t)warning < (uint32_t)WARNING_COUNT ? texts[warning] : "unknown";
 }

@@ -32,6 +32,7 @@ enum supervisor_warning {
     WARNING_TIP_LOST = 0, /* bend runs open loop */
     WARNING_NO_TABLE,     /* pressure commands only */
     WARNING_COMMAND_LIMITED,
+    WARNING_MODEL_GAP, /* the gap monitor raised a stage (gap_monitor.h) */
     WARNING_COUNT
 };
 

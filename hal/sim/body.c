@@ -41,3 +41,151 @@ void body_tip_pose(const struct bend_table_module *module, const struct body_sha
     pose->quaternion[2] = x * sin(0.5 * bend);
     pose->quaternion[3] = 0.0;
 }
+
+/* --- under weight --- */
+
+/* d (area) / (area dp) times the shear modulus, of a chamber at rest: 1 for a round hole in a wide body (Lame
+ * 1852). Sections of the founding paper that were solved, with their chambers near the surface: 1.5
+ * (circle), 2.1 (semicircle), 2.3 (sector). */
+#define INFLATION_BY_MODULUS 2.1
+/* Of a chamber's centroid from the axis over the outer diameter: 0.29 to 0.36 in these. */
+#define CHAMBER_OFFSET (1.0 / 3.0)
+
+/* Two ways to bend more: a chamber that lengthens more under its thrust, or softer rubber round it. Fibres
+ * leave the first, and without fibres the widening of a chamber shortens it as much as the thrust lengthens
+ * it, which leaves the second:
+ *
+ *     1 / EI = kappa' / (A d) + A' / A / (3 k I),   ' by the pressure of one chamber, at rest
+ *
+ * A chamber's area, d its offset, k = INFLATION_BY_MODULUS, E = 3 G. Against rods whose stiffness is solved:
+ * right to 3 % for the reference module, 15 % for one with fibres, 40 % for round chambers without. */
+double body_bending_compliance(const struct bend_table *table) {
+    const double rest_pa[3] = {0.0, 0.0, 0.0}, diameter_m = (double)table->module.outer_diameter_m;
+    const double offset_m = CHAMBER_OFFSET * diameter_m;
+    double curvature[3], inflation[3];
+    struct table_point point;
+    table_point_at(&point, table, rest_pa);
+    const double area_m2 = table_point_value(&point, BEND_TABLE_VOLUME_1, inflation);
+    (void)table_point_value(&point, BEND_TABLE_CURVATURE_X, curvature);
+    const double second_moment_m4 = M_PI / 64.0 * pow(diameter_m, 4.0) - 1.5 * area_m2 * offset_m * offset_m;
+    return fmax(-curvature[0], 0.0) / (area_m2 * offset_m) +
+           fmax(inflation[0], 0.0) / (area_m2 * 3.0 * INFLATION_BY_MODULUS * second_moment_m4);
+}
+
+void body_down(double angle_rad, double direction_rad, double down[3]) {
+    down[0] = sin(angle_rad) * cos(direction_rad);
+    down[1] = sin(angle_rad) * sin(direction_rad);
+    down[2] = cos(angle_rad);
+}
+
+double body_distal_straight_m(const struct bend_table_module *module, const struct body_shape *shape) {
+    return 0.5 * (1.0 - shape->active_fraction) * (double)module->chamber_length_m * shape->stretch;
+}
+
+/* Functions of the bend squared, u, that the arc's points are made of, and their derivatives by u. */
+struct arc_functions {
+    double cosine, sine, tip, mean; /* cos b; sin b / b; (1 - cos b) / b^2; (1 - sin b / b) / b^2 */
+    double cosine_u, sine_u, tip_u, mean_u;
+};
+
+static struct arc_functions arc_functions_at(double u) {
+    struct arc_functions f;
+    if (u < 0.01) { /* Taylor; what is left out is under 1e-12 */
+        f.sine = 1.0 - u / 6.0 * (1.0 - u / 20.0 * (1.0 - u / 42.0));
+        f.cosine = 1.0 - u / 2.0 * (1.0 - u / 12.0 * (1.0 - u / 30.0 * (1.0 - u / 56.0)));
+        f.tip = 1.0 / 2.0 - u / 24.0 * (1.0 - u / 30.0 * (1.0 - u / 56.0));
+        f.mean = 1.0 / 6.0 - u / 120.0 * (1.0 - u / 42.0 * (1.0 - u / 72.0));
+        f.sine_u = -1.0 / 6.0 + u / 60.0 * (1.0 - u / 28.0 * (1.0 - u / 54.0));
+        f.tip_u = -1.0 / 24.0 + u / 360.0 * (1.0 - 3.0 * u / 112.0);
+        f.mean_u = -1.0 / 120.0 + u / 2520.0 * (1.0 - u / 48.0);
+    } else {
+        const double b = sqrt(u);
+        f.cosine = cos(b);
+        f.sine = sin(b) / b;
+        f.tip = (1.0 - f.cosine) / u;
+        f.mean = (1.0 - f.sine) / u;
+        f.sine_u = 0.5 * (f.cosine - f.sine) / u;
+        f.tip_u = (0.5 * f.sine - f.tip) / u;
+        f.mean_u = -(f.sine_u + f.mean) / u;
+    }
+    f.cosine_u = -0.5 * f.sine;
+    return f;
+}
+
+/* Gradient by the bend vector of the work that the weight does, N m: of an arc of `length_m` the mean point
+ * lies at b L mean across and L tip along, its end at b L tip and L sine. */
+static void work_gradient(const struct body_weight *weight, double length_m, const double b[2],
+                          double gradient[2]) {
+    const struct arc_functions f = arc_functions_at(b[0] * b[0] + b[1] * b[1]);
+    const double spread = weight->spread_n * length_m, end = weight->end_n * length_m;
+    const double beyond = weight->end_n * weight->end_beyond_m;
+    const double across = spread * f.mean + end * f.tip + beyond * f.sine;
+    const double across_u = spread * f.mean_u + end * f.tip_u + beyond * f.sine_u;
+    const double along_u = spread * f.tip_u + end * f.sine_u + beyond * f.cosine_u;
+    const double level = weight->down[0] * b[0] + weight->down[1] * b[1];
+    for (int i = 0; i < 2; i++) {
+        gradient[i] = across * weight->down[i] + 2.0 * b[i] * (level * across_u + weight->down[2] * along_u);
+    }
+}
+
+/* The step of a Newton method on an energy; where that curves down, it goes downhill all the same. */
+static void descend(double hessian[2][2], const double slope[2], double step[2]) {
+    const double least = 0.2; /* curvature along a principal direction */
+    const double half = 0.5 * (hessian[0][0] - hessian[1][1]), middle = 0.5 * (hessian[0][0] + hessian[1][1]);
+    const double off = 0.5 * (hessian[0][1] + hessian[1][0]), radius = hypot(half, off);
+    const double angle = 0.5 * atan2(off, half), c = cos(angle), s = sin(angle);
+    const double first = (c * slope[0] + s * slope[1]) / fmax(fabs(middle + radius), least);
+    const double second = (c * slope[1] - s * slope[0]) / fmax(fabs(middle - radius), least);
+    step[0] = -(c * first - s * second);
+    step[1] = -(s * first + c * second);
+}
+
+/* A module with a weight on it. */
+struct sag {
+    const struct body_weight *weight;
+    double length_m;
+    double give; /* bend by a moment of one, rad/(N m) */
+    double start[2];
+};
+
+/* First and second derivatives of the energy, over the bending stiffness. */
+static void energy_slopes(const struct sag *sag, const double b[2], double slope[2], double hessian[2][2]) {
+    const double nudge = 1e-5;
+    double gradient[2], moved[2];
+    work_gradient(sag->weight, sag->length_m, b, gradient);
+    for (int k = 0; k < 2; k++) {
+        double beside[2] = {b[0], b[1]};
+        beside[k] += nudge;
+        work_gradient(sag->weight, sag->length_m, beside, moved);
+        for (int j = 0; j < 2; j++) {
+            hessian[j][k] = (j == k) - sag->give * (moved[j] - gradient[j]) / nudge;
+        }
+        slope[k] = b[k] - sag->start[k] - sag->give * gradient[k];
+    }
+}
+
+/* Least of the energies that arcs can have (Rayleigh 1877, Ritz 1909), bending (b - b0)^2 / (2 give) less the
+ * work of the weight. For small bends of a level module that is the slope of a cantilever, w L^3 / (6 EI) and
+ * F L^2 / (2 EI). */
+void body_bend_under(const struct bend_table *table, double stiffness_scale, const struct body_weight *weight,
+                     struct body_shape *shape) {
+    enum { STEPS = 20 };
+    const double length_m = shape->active_fraction * (double)table->module.chamber_length_m * shape->stretch;
+    const struct sag sag = {weight,
+                            length_m,
+                            body_bending_compliance(table) / stiffness_scale * length_m,
+                            {shape->bend_x_rad, shape->bend_y_rad}};
+    const double longest = 0.5, enough = 1e-7;
+    double b[2] = {sag.start[0], sag.start[1]}, size = 1.0;
+    for (int i = 0; i < STEPS && size > enough; i++) {
+        double slope[2], hessian[2][2], step[2];
+        energy_slopes(&sag, b, slope, hessian);
+        descend(hessian, slope, step);
+        size = hypot(step[0], step[1]);
+        const double kept = size > longest ? longest / size : 1.0;
+        b[0] += kept * step[0];
+        b[1] += kept * step[1];
+    }
+    shape->bend_x_rad = b[0];
+    shape->bend_y_rad = b[1];
+}

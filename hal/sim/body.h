@@ -23,4 +23,22 @@ void body_shape_at(const struct bend_table *table, const double pressure_pa[3], 
 /* Pose of the tip face's centre. */
 void body_tip_pose(const struct bend_table_module *module, const struct body_shape *shape, struct tip_pose *pose);
 
+/* What gravity pulls at. */
+struct body_weight {
+    double down[3];      /* unit vector */
+    double spread_n;     /* evenly over the length that bends */
+    double end_n;        /* on the tip's axis, ... */
+    double end_beyond_m; /* ... so far before the tip's end of that length */
+};
+/* Down, of a module mounted with that angle between its axis at the base and down (0: it hangs, pi / 2: level) and down's
+ * direction in the x-y plane. */
+void body_down(double angle_rad, double direction_rad, double down[3]);
+/* Bend a length by a moment of one, 1/(N m2), at rest: estimated from the table, which holds no stiffness (see there). */
+double body_bending_compliance(const struct bend_table *table);
+/* The length between the end of the arc and the distal cap. */
+double body_distal_straight_m(const struct bend_table_module *module, const struct body_shape *shape);
+/* Bend `shape` to where the weight and the rubber's stiffness, so many times the table's, are in balance. */
+void body_bend_under(const struct bend_table *table, double stiffness_scale, const struct body_weight *weight,
+                     struct body_shape *shape);
+
 #endif

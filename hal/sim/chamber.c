@@ -114,6 +114,16 @@ void chambers_init(struct chambers *chambers, const struct gas_parameters *param
     }
 }
 
+void chambers_set_pressure(struct chambers *chambers, const struct gas_parameters *parameters,
+                           const struct bend_table *table, const double pressure_pa[3]) {
+    chambers->ballooned = CHAMBERS_NONE;
+    memcpy(chambers->coordinate, pressure_pa, sizeof chambers->coordinate);
+    look_up(chambers, parameters, table);
+    for (size_t c = 0; c < 3; c++) {
+        chambers->gas[c] = (parameters->ambient_pa_abs + chambers->pressure_pa[c]) * chambers->volume_m3[c];
+    }
+}
+
 /* 3 x 3 by Cramer's rule; the matrix is near diagonal in units of its own and never singular. */
 static void solve3(double a[3][3], const double b[3], double x[3]) {
     const double minor0 = a[1][1] * a[2][2] - a[1][2] * a[2][1];
@@ -177,33 +187,38 @@ struct port {
     bool supply_open;
 };
 
-/* Rate of p V, Pa m3/s. */
-static double gas_rate(const struct port *port, bool fills, double chamber_pa_abs) {
+/* Rate of p V through the valve, Pa m3/s. */
+static double valve_rate(const struct port *port, bool fills, double chamber_pa_abs) {
     const struct gas_parameters *parameters = port->parameters;
-    const double ambient = parameters->ambient_pa_abs;
-    const double other = fills ? port->supply_pa_abs : ambient;
-    double flow = -gas_mass_flow(parameters, port->leak_conductance, chamber_pa_abs, ambient);
-    flow += gas_mass_flow(parameters, port->conductance, other, chamber_pa_abs);
+    const double other = fills ? port->supply_pa_abs : parameters->ambient_pa_abs;
+    double flow = gas_mass_flow(parameters, port->conductance, other, chamber_pa_abs);
     if (!fills || port->supply_open) {
         flow -= gas_mass_flow(parameters, port->conductance, chamber_pa_abs, other);
     }
     return parameters->gas_constant * parameters->temperature_k * flow;
 }
 
+static double leak_rate(const struct port *port, double chamber_pa_abs) {
+    const struct gas_parameters *parameters = port->parameters;
+    return parameters->gas_constant * parameters->temperature_k *
+           gas_mass_flow(parameters, port->leak_conductance, chamber_pa_abs, parameters->ambient_pa_abs);
+}
+
 /* One stretch of time with the valve at rest, by the midpoint rule; pressure moves by the chamber's own capacity. Returns
- * the change of gas. */
+ * what came through the valve. */
 static double integrate(const struct port *port, bool fills, double duration_s, double *gas, double *pressure_pa_abs) {
-    const double before = *gas;
     const double half = 0.5 * duration_s * port->slope;
-    const double start = gas_rate(port, fills, *pressure_pa_abs);
-    const double middle = gas_rate(port, fills, fmax(*pressure_pa_abs + half * start, 0.0));
+    const double start = valve_rate(port, fills, *pressure_pa_abs) - leak_rate(port, *pressure_pa_abs);
+    const double middle_pa_abs = fmax(*pressure_pa_abs + half * start, 0.0);
+    const double through = valve_rate(port, fills, middle_pa_abs);
+    const double middle = through - leak_rate(port, middle_pa_abs);
     *gas += duration_s * middle;
     *pressure_pa_abs += duration_s * middle * port->slope;
     if (!fills && *pressure_pa_abs < port->parameters->ambient_pa_abs && port->slope > 0.0) {
         *gas += (port->parameters->ambient_pa_abs - *pressure_pa_abs) / port->slope;
         *pressure_pa_abs = port->parameters->ambient_pa_abs; /* a vent ends at ambient, it does not overshoot */
     }
-    return *gas - before;
+    return duration_s * through;
 }
 
 /* More or less dead volume appears at the chamber's pressure: no air moves. */
@@ -237,9 +252,9 @@ void chambers_step(struct chambers *chambers, const struct gas_parameters *param
             const int64_t switch_us = valve_next_switch_us(&valve[c], at_us);
             const int64_t end_us = switch_us < to_us ? switch_us : to_us;
             const bool fills = valve_fills(&valve[c], at_us);
-            const double moved =
+            const double through =
                 integrate(&port, fills, 1e-6 * (double)(end_us - at_us), &chambers->gas[c], &pressure_pa_abs);
-            drawn += fills ? fmax(moved, 0.0) : 0.0;
+            drawn += fills ? fmax(through, 0.0) : 0.0;
             at_us = end_us;
         }
         change[c] = chambers->gas[c] - before;

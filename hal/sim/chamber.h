@@ -51,6 +51,9 @@ struct chamber_influence {
 /* Mass flow from upstream to downstream, kg/s (ISO 6358-1:2013); negative pressures differences give zero. */
 double gas_mass_flow(const struct gas_parameters *parameters, double conductance, double up_pa_abs, double down_pa_abs);
 void chambers_init(struct chambers *chambers, const struct gas_parameters *parameters, const struct bend_table *table);
+/* Start again from these gauge pressures, below any snap. */
+void chambers_set_pressure(struct chambers *chambers, const struct gas_parameters *parameters,
+                           const struct bend_table *table, const double pressure_pa[3]);
 /* The section at the chambers' state: curvature (x, y), 1/m, and stretch. */
 void chambers_curvature(const struct chambers *chambers, const struct bend_table *table, double curvature_1pm[2]);
 double chambers_stretch(const struct chambers *chambers, const struct bend_table *table);

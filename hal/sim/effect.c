@@ -109,10 +109,11 @@ static void put_back(struct effect_signals *signals, const struct per_chamber *k
 }
 
 static void run_one(struct effect *effect, effect_hook hook, struct effect_signals *signals) {
-    struct per_chamber kept;
+    struct per_chamber kept = {0};
     if (effect->chamber > 0) {
         keep(&kept, signals);
     }
+    signals->chamber = effect->chamber;
     hook(effect->state, effect->parameter, signals);
     for (size_t c = 0; c < 3 && effect->chamber > 0; c++) {
         if (c + 1 != effect->chamber) {

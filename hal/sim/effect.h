@@ -8,6 +8,7 @@
 #ifndef TRIBEND_SIM_EFFECT_H
 #define TRIBEND_SIM_EFFECT_H
 
+#include <math.h> /* NAN, for parameters without a value at which the effect is gone */
 #include <stdbool.h>
 #include <stddef.h>
 
@@ -48,6 +49,7 @@ struct effect_signals {
     double step_s;
     double temperature_k; /* NAN: not known */
     double chance;        /* uniform in (0, 1), new at each tip sample */
+    size_t chamber;       /* 1 to 3: the one that the effect is kept to; 0: none (filled in by effects_run()) */
     const struct bend_table *table;
     double stiffness_scale;
     const double *pressure_pa;           /* [3] true chamber pressures */
@@ -56,7 +58,8 @@ struct effect_signals {
     double *late_s;                      /* [3] command hook: by how much each valve sees its period late */
     struct chamber_influence *influence; /* gas hook */
     double *reading_pa;                  /* [3] reading hook: what noise-free sensors show */
-    double *load_pa;                     /* [3] load hook: pressures that bend the module, on the table's scale */
+    double *load_pa;                     /* [3] load hook: pressures that bend the module, on the table's scale; shape and
+                                          * pose hooks may look, after all the load hooks */
     struct body_shape *shape;            /* shape hook */
     struct tip_pose *pose;               /* pose hook */
 };

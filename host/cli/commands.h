@@ -14,6 +14,10 @@ int cli_bend(int argc, char **argv);
 int cli_pressure(int argc, char **argv);
 int cli_status(int argc, char **argv);
 int cli_plot(int argc, char **argv);
+int cli_record(int argc, char **argv);
+int cli_import(int argc, char **argv);
+int cli_gap(int argc, char **argv);
+int cli_effects(int argc, char **argv);
 
 /* Options of every subcommand that talks to a controller. */
 struct bus_options {
@@ -44,6 +48,8 @@ struct bus {
     char found[PROGRAM_PATH_BYTES];
 };
 
+/* The table that is meant: `table`, else $TRIBEND_TABLE, else the reference table. */
+const char *bus_table_path(const char *table, char found[PROGRAM_PATH_BYTES]);
 /* Returns an exit code, with the message printed. */
 int bus_open(struct bus *bus, const struct bus_options *options);
 void bus_close(struct bus *bus);

@@ -5,7 +5,11 @@ static const struct program_subcommand subcommands[] = {
     {"bend", cli_bend, "bend the tip to an angle in a direction, in closed loop"},
     {"pressure", cli_pressure, "hold three chamber pressures"},
     {"status", cli_status, "say what the controller sees and which faults it has"},
-    {"plot", cli_plot, "draw a recorded run"}};
+    {"plot", cli_plot, "draw a recorded run"},
+    {"record", cli_record, "write down what a controller does, without commanding it"},
+    {"import", cli_import, "make a run log of another lab's recording"},
+    {"effects", cli_effects, "list what the simulated module can be given, and what each leaves in a recording"},
+    {"gap", cli_gap, "say why the module differs from its model"}};
 
 int main(int argc, char **argv) {
     return program_run("tribend", subcommands, sizeof subcommands / sizeof subcommands[0], argc, argv);

@@ -104,12 +104,17 @@ void bus_options_init(struct bus_options *options) {
     options->duration_s = 5.0;
 }
 
-int bus_open(struct bus *bus, const struct bus_options *options) {
-    bus->table_path = options->table != NULL ? options->table : getenv("TRIBEND_TABLE");
-    if (bus->table_path == NULL || *bus->table_path == '\0') {
-        program_find(REFERENCE_TABLE, bus->found);
-        bus->table_path = bus->found;
+const char *bus_table_path(const char *table, char found[PROGRAM_PATH_BYTES]) {
+    const char *path = table != NULL ? table : getenv("TRIBEND_TABLE");
+    if (path == NULL || *path == '\0') {
+        program_find(REFERENCE_TABLE, found);
+        path = found;
     }
+    return path;
+}
+
+int bus_open(struct bus *bus, const struct bus_options *options) {
+    bus->table_path = bus_table_path(options->table, bus->found);
     const int code = table_file_open(&bus->file, bus->table_path, options->module);
     if (code != EXIT_OK) {
         return code;

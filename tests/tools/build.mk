@@ -3,14 +3,14 @@
 JOBS := $(shell nproc 2>/dev/null || echo 1)
 
 BUILD_PACKAGES := gcc libc6-dev pkg-config libgmsh-dev libsuitesparse-dev libgsl-dev libcyaml-dev libyaml-dev \
-                  libopenmpi-dev openmpi-bin zlib1g-dev libcmocka-dev calculix-ccx gnuplot-nox fonts-dejavu-core
+                  libopenmpi-dev openmpi-bin zlib1g-dev libjansson-dev libcmocka-dev calculix-ccx gnuplot-nox fonts-dejavu-core
 LINT_PACKAGES  := clang clang-tidy cppcheck gcc-arm-none-eabi libnewlib-arm-none-eabi
 
 # --- sources: a folder is a layer; arrows between layers are include paths below
 FIRMWARE_C := $(wildcard firmware/*.c firmware/*/*.c)
 SIM_C      := $(wildcard hal/sim/*.c hal/sim/effects/*.c)
 MODEL_C    := $(filter-out model/cli/%,$(wildcard model/*/*.c))
-SHARED_C    := $(wildcard model/units/*.c model/program/*.c)
+SHARED_C    := $(wildcard model/units/*.c model/program/*.c) model/description/yaml_file.c
 TABLES_CLI_C := $(wildcard model/cli/*.c)
 HOST_C     := $(filter-out host/cli/main.c,$(wildcard host/*/*.c))
 HOST_MAIN  := host/cli/main.c
@@ -47,6 +47,7 @@ PROGRAMS := $(BUILD)/tribend-tables $(BUILD)/tribend
 TEST_PROGRAMS  := $(patsubst %.c,$(BUILD)/%,$(TEST_C))
 BENCH_PROGRAMS := $(patsubst %.c,$(BUILD)/%,$(BENCH_C))
 
+HOST_LIBS  := -ljansson -lcyaml -lyaml -fopenmp -lm
 MODEL_LIBS := $(shell pkg-config --libs mpi-c 2>/dev/null) -lgmsh -lcholmod -lgsl -lgslcblas -lcyaml -lyaml -lz -fopenmp -lm
 
 # V=1 shows the commands in full.
@@ -58,6 +59,9 @@ $(BUILD)/firmware/%.o: firmware/%.c
 $(BUILD)/model/%.o: model/%.c
 	@mkdir -p $(@D)
 	$(say)$(CC) $(OPTIMISE) $(SANITIZE_FLAGS) $(MODEL_FLAGS) -MMD -MP -c $< -o $@
+$(BUILD)/host/gap/%.o: host/gap/%.c
+	@mkdir -p $(@D)
+	$(say)$(CC) $(OPTIMISE) $(SANITIZE_FLAGS) $(COMMON_FLAGS) -fopenmp -MMD -MP -c $< -o $@
 $(BUILD)/%.o: %.c
 	@mkdir -p $(@D)
 	$(say)$(CC) $(OPTIMISE) $(SANITIZE_FLAGS) $(COMMON_FLAGS) -MMD -MP -c $< -o $@
@@ -67,7 +71,7 @@ link = $(if $(V),,@echo '  link $@';) $(CC) $(SANITIZE_FLAGS) $(filter %.o,$^) -
 $(BUILD)/tribend-tables: $(TABLES_CLI_O) $(MODEL_O) $(FIRMWARE_O)
 	$(link) $(MODEL_LIBS)
 $(BUILD)/tribend: $(call object,$(HOST_MAIN)) $(HOST_O) $(SIM_O) $(FIRMWARE_O) $(SHARED_O)
-	$(link) -lm
+	$(link) $(HOST_LIBS)
 
 .PHONY: test-programs bench-programs
 test-programs: $(TEST_PROGRAMS)
@@ -80,7 +84,7 @@ $(BUILD)/tests/model/test_solid $(BUILD)/tests/bench/bench_solid: $(call object,
 $(BUILD)/tests/bench/bench_model $(BUILD)/tests/bench/bench_solid: %: %.o $(MODEL_O) $(FIRMWARE_O)
 	$(link) $(MODEL_LIBS)
 $(BUILD)/tests/%: $(BUILD)/tests/%.o $(SUPPORT_O) $(HOST_O) $(SIM_O) $(FIRMWARE_O) $(SHARED_O)
-	$(link) -lcmocka -lm
+	$(link) -lcmocka $(HOST_LIBS)
 
 .SECONDARY:
 -include $(patsubst %.c,$(BUILD)/%.d,$(ALL_C))

@@ -1,0 +1,112 @@
+/* tribend record: write down what a controller does, without commanding it. */
+#include <inttypes.h>
+#include <stdio.h>
+#include <string.h>
+
+#include "cli/commands.h"
+#include "log/run_log.h"
+
+#define WORDS_BYTES 512
+
+static const struct argp_option options[] = {
+    {"output", 'o', "RUN.csv", 0, "the run log to write (required)", 0}, {0}};
+
+static error_t parse(int key, char *argument, struct argp_state *state) {
+    struct bus_options *bus = state->input;
+    switch (key) {
+    case ARGP_KEY_INIT:
+        state->child_inputs[0] = bus;
+        return 0;
+    case 'o':
+        bus->record = argument;
+        return 0;
+    case ARGP_KEY_ARG:
+        argp_error(state, "record takes no argument, '%s' is too much", argument);
+        return 0;
+    case ARGP_KEY_END:
+        if (bus->record == NULL) {
+            argp_error(state, "where to? For example: -o run.csv --for 10s");
+        }
+        return 0;
+    default:
+        return ARGP_ERR_UNKNOWN;
+    }
+}
+
+static const struct argp_child children[] = {{&bus_options_parser, 0, NULL, 1}, {0}};
+static const struct argp parser = {options,
+                                   parse,
+                                   "",
+                                   "Write down what the controller does, without commanding it.\v"
+                                   "Example: tribend record -o run.csv --for 10s",
+                                   children,
+                                   NULL,
+                                   NULL};
+
+/* Until the time is over, or Ctrl-C; an exit code. */
+static int follow(struct bus *bus, const struct bus_options *bus_options, struct run_log_writer *log,
+                  uint64_t *rows, struct link_report *report) {
+    const struct controller_command nothing = {.kind = COMMAND_NONE};
+    int64_t end_us = 0;
+    do {
+        sim_drill_apply(&bus_options->drill, &bus->sim, bus->file.bytes, bus->file.size);
+        if (!bus->link.receive(bus->link.context, report)) {
+            return program_fail(EXIT_OUTPUT, "the controller on bus %s went away after %" PRIu64 " rows",
+                                bus_options->bus, *rows);
+        }
+        end_us = *rows == 0 ? report->time_us + (int64_t)(1e6 * bus_options->duration_s) : end_us;
+        run_log_append(log, report, &nothing);
+        ++*rows;
+    } while (report->time_us < end_us && program_interrupted == 0);
+    return program_interrupted == 0 ? EXIT_OK : EXIT_INTERRUPTED;
+}
+
+static void print_summary(const struct bus_options *bus_options, const struct link_report *report,
+                          uint64_t rows) {
+    char words[WORDS_BYTES];
+    printf("rows      %" PRIu64 ", until %.3f s\n", rows, 1e-6 * (double)report->time_us);
+    printf("state     %s\n", supervisor_state_name(report->status.state));
+    cli_describe_faults(report->status.faults, words, sizeof words);
+    printf("faults    %s\n", words);
+    printf("wrote     %s\n", bus_options->record);
+}
+
+static int record(struct bus *bus, const struct bus_options *bus_options) {
+    const struct bend_table_module *module = &bus->file.table.module;
+    char error[PROGRAM_ERROR_BYTES], note[64];
+    struct run_log_writer log;
+    struct link_report report;
+    uint64_t rows = 0;
+    (void)snprintf(note, sizeof note, "bus %s, seed %" PRIu64, bus_options->bus, bus_options->seed);
+    const struct run_log_metadata metadata = {.module = module->name,
+                                              .table_hash = module->inputs_hash,
+                                              .rate_hz = 1e6 / (double)CONTROLLER_STEP_US,
+                                              .note = note};
+    memset(&report, 0, sizeof report);
+    if (!run_log_create(&log, bus_options->record, &metadata, error, sizeof error)) {
+        return program_fail(EXIT_OUTPUT, "%s", error);
+    }
+    program_catch_interrupt();
+    const int code = follow(bus, bus_options, &log, &rows, &report);
+    if (!run_log_finish(&log, error, sizeof error)) { /* what came before the link went is worth keeping */
+        return program_fail(EXIT_OUTPUT, "%s", error);
+    }
+    print_summary(bus_options, &report, rows);
+    return code == EXIT_OK && report.status.faults != 0u ? EXIT_FAULT : code;
+}
+
+int cli_record(int argc, char **argv) {
+    static struct bus bus;
+    struct bus_options bus_options;
+    bus_options_init(&bus_options);
+    argp_err_exit_status = EXIT_USAGE;
+    if (argp_parse(&parser, argc, argv, 0, NULL, &bus_options) != 0) {
+        return EXIT_USAGE;
+    }
+    int code = bus_open(&bus, &bus_options);
+    if (code == EXIT_OK) {
+        code = record(&bus, &bus_options);
+        bus_close(&bus);
+    }
+    return code;
+}

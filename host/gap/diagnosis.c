@@ -1,0 +1,489 @@
+#include "gap/diagnosis.h"
+
+#include <math.h>
+#include <stdarg.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+#define DEGREES (180.0 / M_PI)
+#define NINETY_PERCENT 1.645
+/* A gap whose structure is below this share of the noise floor's square is none. */
+#define STRUCTURE_NONE 0.10
+/* Recalibration is the answer where it leaves no more than that, or this share of what was there. */
+#define RECALIBRATED_SHARE 0.05
+/* Catalogue effects must close this share of the structured gap, or the gap is of an unknown kind. */
+#define CLOSED_LEAST 0.70
+/* A trial this much worse than the best, as a share of the gap, is e times less believed. */
+#define BELIEF_SHARE 0.02
+#define GROUP_LEAST 0.15 /* belief that puts a name into the group */
+#define SURE 0.60        /* belief above which one name is the verdict */
+#define CHUNK_S 2.5      /* of the bootstrap */
+#define RESAMPLES 400
+
+const char *gap_verdict_name(enum gap_verdict verdict) {
+    static const char *const names[GAP_VERDICT_COUNT] = {"no-gap", "recalibrate", "effect",           "effects",
+                                                         "group",  "unknown",     "insufficient-data"};
+    return names[verdict];
+}
+
+void diagnosis_warn(struct diagnosis *diagnosis, const char *format, ...) {
+    va_list arguments;
+    if (diagnosis->warnings < DIAGNOSIS_WARNINGS_MAX) {
+        va_start(arguments, format);
+        (void)vsnprintf(diagnosis->warning[diagnosis->warnings++], DIAGNOSIS_TEXT_BYTES, format, arguments);
+        va_end(arguments);
+    }
+}
+
+/* --- how far --- */
+
+/* Held-out residuals of one model: squares and what of them is structure, by chunk of time. */
+struct chunks {
+    size_t count;
+    double *square;   /* sum of squares */
+    double *noise;    /* sum of squares of half differences of neighbours: noise alone */
+    double *residual; /* how many */
+};
+
+struct model_view {
+    double *residual; /* [residuals], whitened */
+    struct chunks chunks;
+};
+
+static bool view_open(struct model_view *view, size_t residuals, size_t chunks) {
+    view->residual = calloc(residuals, sizeof(double));
+    view->chunks.count = chunks;
+    view->chunks.square = calloc(chunks, sizeof(double));
+    view->chunks.noise = calloc(chunks, sizeof(double));
+    view->chunks.residual = calloc(chunks, sizeof(double));
+    return view->residual != NULL && view->chunks.square != NULL && view->chunks.noise != NULL &&
+           view->chunks.residual != NULL;
+}
+
+static void view_close(struct model_view *view) {
+    free(view->residual);
+    free(view->chunks.square);
+    free(view->chunks.noise);
+    free(view->chunks.residual);
+}
+
+struct series {
+    size_t start;    /* of the first element in the vector */
+    size_t stride;
+    size_t count;
+    double block_s;
+    size_t first_chunk;
+};
+
+/* The series of a run: three pressures, one supply, six tip channels. */
+static size_t list_series(const struct replay *replay, size_t index, size_t first_chunk, struct series series[10]) {
+    const struct replay_run *run = &replay->run[index];
+    size_t count = 0;
+    for (size_t c = 0; c < 3; c++) {
+        series[count++] = (struct series){run->pressure_at + c, 3, run->blocks, 0.02, first_chunk};
+    }
+    series[count++] = (struct series){run->supply_at, 1, run->blocks, 0.02, first_chunk};
+    for (size_t k = 0; k < REPLAY_TIP_CHANNELS; k++) {
+        series[count++] = (struct series){run->tip_at + k, REPLAY_TIP_CHANNELS, run->tip_blocks, 0.05, first_chunk};
+    }
+    return count;
+}
+
+static size_t chunks_of(const struct replay_run *run) {
+    return (size_t)(1e-3 * (double)run->steps / CHUNK_S) + 2;
+}
+
+/* Of neighbours both held out, half the squared difference is noise. */
+static void count_series(const struct replay *replay, const struct series *series, struct model_view *view) {
+    for (size_t b = 0; b < series->count; b++) {
+        const size_t at = series->start + b * series->stride;
+        const size_t chunk = series->first_chunk + (size_t)((double)b * series->block_s / CHUNK_S);
+        if (!replay->held_out[at] || !(replay->weight[at] > 0.0) || chunk >= view->chunks.count) {
+            continue;
+        }
+        const double now = view->residual[at];
+        view->chunks.square[chunk] += now * now;
+        view->chunks.residual[chunk] += 1.0;
+        const bool follows = b > 0 && replay->held_out[at - series->stride] && replay->weight[at - series->stride] > 0.0;
+        const double step = follows ? now - view->residual[at - series->stride] : now;
+        view->chunks.noise[chunk] += follows ? 0.5 * step * step : 0.0;
+    }
+}
+
+static void fill_view(const struct replay *replay, const struct gap_model *model, struct replay_state *state,
+                      struct model_view *view) {
+    size_t first_chunk = 0;
+    replay_pressures(replay, model, state);
+    replay_take_pressures(replay, state, view->residual);
+    replay_tip(replay, model, state, false, view->residual);
+    for (size_t i = 0; i < replay->runs; i++) {
+        struct series series[10];
+        const size_t count = list_series(replay, i, first_chunk, series);
+        for (size_t s = 0; s < count; s++) {
+            count_series(replay, &series[s], view);
+        }
+        first_chunk += chunks_of(&replay->run[i]);
+    }
+}
+
+static double mean_square(const struct chunks *chunks, const double *sum, const size_t *pick) {
+    double total = 0.0, count = 0.0;
+    for (size_t i = 0; i < chunks->count; i++) {
+        const size_t at = pick == NULL ? i : pick[i];
+        total += sum[at];
+        count += chunks->residual[at];
+    }
+    return count > 0.0 ? total / count : 0.0;
+}
+
+static double share_closed(const struct chunks *before, const struct chunks *after, double floor2, const size_t *pick) {
+    const double gap = mean_square(before, before->square, pick) - floor2;
+    return gap > 0.0 ? 1.0 - (mean_square(after, after->square, pick) - floor2) / gap : 0.0;
+}
+
+static int compare(const void *a, const void *b) {
+    const double x = *(const double *)a, y = *(const double *)b;
+    return (x > y) - (x < y);
+}
+
+/* Interval by resampling chunks of time (Efron and Tibshirani 1993), seeded: the same answer every time. */
+static struct diagnosis_interval bootstrap(const struct chunks *before, const struct chunks *after, double floor2) {
+    double value[RESAMPLES];
+    size_t *pick = calloc(before->count + 1, sizeof *pick);
+    uint64_t state = 0x9e3779b97f4a7c15u;
+    struct diagnosis_interval interval = {share_closed(before, after, floor2, NULL), 0.0, 0.0};
+    for (size_t k = 0; k < RESAMPLES && pick != NULL; k++) {
+        for (size_t i = 0; i < before->count; i++) {
+            state = state * 6364136223846793005u + 1442695040888963407u;
+            pick[i] = (size_t)((state >> 33) % before->count);
+        }
+        value[k] = share_closed(before, after, floor2, pick);
+    }
+    if (pick != NULL) {
+        qsort(value, RESAMPLES, sizeof value[0], compare);
+        interval.low = value[RESAMPLES / 20];
+        interval.high = value[RESAMPLES - 1 - RESAMPLES / 20];
+    }
+    free(pick);
+    return interval;
+}
+
+/* Root mean square of held-out blocks in physical units: r1 in kPa, positions in mm, angles in degrees. */
+static void physical_rms(const struct replay *replay, const double *residual, double rms[3]) {
+    double sum[3] = {0.0, 0.0, 0.0}, count[3] = {0.0, 0.0, 0.0};
+    static const double unit[3] = {1e-3, 1e3, DEGREES};
+    for (size_t i = 0; i < replay->runs; i++) {
+        const struct replay_run *run = &replay->run[i];
+        const size_t end = run->tip_at + REPLAY_TIP_CHANNELS * run->tip_blocks;
+        for (size_t k = run->pressure_at; k < end; k++) {
+            const bool supply = k >= run->supply_at && k < run->tip_at;
+            const size_t kind = k < run->supply_at ? 0 : (k - run->tip_at) % REPLAY_TIP_CHANNELS < 3 ? 1 : 2;
+            if (!supply && replay->held_out[k] && replay->weight[k] > 0.0) {
+                const double value = residual[k] / replay->weight[k] * unit[kind];
+                sum[kind] += value * value;
+                count[kind] += 1.0;
+            }
+        }
+    }
+    for (size_t kind = 0; kind < 3; kind++) {
+        rms[kind] = count[kind] > 0.0 ? sqrt(sum[kind] / count[kind]) : NAN;
+    }
+}
+
+static double *figure(struct diagnosis_gap *gap, size_t which) {
+    return which == 0 ? &gap->before : which == 1 ? &gap->after_recalibration : &gap->after_effect;
+}
+
+/* Floor: what noise alone leaves of neighbouring blocks' differences. */
+static void physical_floor(const struct replay *replay, const double *residual, double floor_of[3]) {
+    double sum[3] = {0.0, 0.0, 0.0}, count[3] = {0.0, 0.0, 0.0};
+    static const double unit[3] = {1e-3, 1e3, DEGREES};
+    for (size_t i = 0; i < replay->runs; i++) {
+        struct series series[10];
+        const size_t all = list_series(replay, i, 0, series);
+        for (size_t s = 0; s < all; s++) {
+            const size_t kind = s < 3 ? 0 : s < 7 ? 1 : 2;
+            for (size_t b = 1; b < series[s].count && s != 3; b++) {
+                const size_t at = series[s].start + b * series[s].stride, last = at - series[s].stride;
+                if (replay->weight[at] > 0.0 && replay->weight[last] > 0.0) {
+                    const double step = (residual[at] / replay->weight[at] - residual[last] / replay->weight[last]) * unit[kind];
+                    sum[kind] += 0.5 * step * step;
+                    count[kind] += 1.0;
+                }
+            }
+        }
+    }
+    for (size_t kind = 0; kind < 3; kind++) {
+        floor_of[kind] = count[kind] > 0.0 ? sqrt(sum[kind] / count[kind]) : NAN;
+    }
+}
+
+static bool measure_gaps(struct diagnosis *diagnosis, struct search *search) {
+    static const char *const names[DIAGNOSIS_RESIDUALS] = {"r1_pressure", "r2_position", "r2_angle", "r3_position", "r3_angle"};
+    static const char *const units[DIAGNOSIS_RESIDUALS] = {"kPa", "mm", "deg", "mm", "deg"};
+    const struct replay *replay = &search->replay;
+    const struct gap_model *models[3] = {&search->nominal.model, &search->recalibrated.model, &search->best.model};
+    struct model_view view[3] = {{0}};
+    struct replay_state state;
+    size_t chunks = 0;
+    for (size_t i = 0; i < replay->runs; i++) {
+        chunks += chunks_of(&replay->run[i]);
+    }
+    bool sound = replay_state_open(&state, replay);
+    for (size_t m = 0; m < 3; m++) {
+        sound = view_open(&view[m], replay->residuals, chunks) && sound;
+    }
+    for (size_t m = 0; m < 3 && sound; m++) {
+        double rms[3], floor_of[3];
+        fill_view(replay, models[m], &state, &view[m]);
+        physical_rms(replay, view[m].residual, rms);
+        for (size_t k = 0; k < 3; k++) {
+            *figure(&diagnosis->gap[k], m) = rms[k];
+        }
+        if (m == 2) {
+            physical_floor(replay, view[m].residual, floor_of);
+            for (size_t k = 0; k < DIAGNOSIS_RESIDUALS; k++) {
+                diagnosis->gap[k].floor = floor_of[k < 3 ? k : k - 2];
+            }
+        }
+        double *other = calloc(replay->residuals, sizeof *other);
+        if (other != NULL) {
+            replay_tip(replay, models[m], &state, true, other);
+            physical_rms(replay, other, rms);
+            *figure(&diagnosis->gap[3], m) = rms[1];
+            *figure(&diagnosis->gap[4], m) = rms[2];
+        }
+        free(other);
+    }
+    if (sound) {
+        const double floor2 = mean_square(&view[2].chunks, view[2].chunks.noise, NULL);
+        for (size_t m = 0; m < 3; m++) {
+            const double structured = mean_square(&view[m].chunks, view[m].chunks.square, NULL) -
+                                      mean_square(&view[m].chunks, view[m].chunks.noise, NULL);
+            diagnosis->structure[m] = floor2 > 0.0 ? fmax(structured, 0.0) / floor2 : 0.0;
+        }
+        diagnosis->closed = bootstrap(&view[0].chunks, &view[2].chunks, floor2);
+        diagnosis->closed_recalibration = bootstrap(&view[0].chunks, &view[1].chunks, floor2);
+    }
+    for (size_t k = 0; k < DIAGNOSIS_RESIDUALS; k++) {
+        diagnosis->gap[k].name = names[k];
+        diagnosis->gap[k].unit = units[k];
+        const bool from_duties = k == 0 || k >= 3;
+        diagnosis->gap[k].measured = !isnan(diagnosis->gap[k].before) && (!from_duties || replay->run[0].run->has_duty);
+    }
+    for (size_t m = 0; m < 3; m++) {
+        view_close(&view[m]);
+    }
+    replay_state_close(&state, replay);
+    return sound;
+}
+
+/* --- which --- */
+
+static double held_out(const struct fit *fit) {
+    return fit->sums.pressure[1] + fit->sums.tip[1];
+}
+
+static bool names_kind(const struct gap_model *model, const struct effect_kind *kind) {
+    for (size_t e = 0; e < model->count; e++) {
+        if (model->effect[e].kind == kind) {
+            return true;
+        }
+    }
+    return false;
+}
+
+/* Belief in each kind at the place of effect `e` of the best model: the trials of its step, each kind by its best. */
+static void weigh_kinds(const struct search *search, size_t step, double *belief, const struct effect_kind **kinds,
+                        size_t *count, const struct gap_model *rest) {
+    double best = INFINITY, worst = 0.0;
+    *count = 0;
+    for (size_t t = 0; t < search->trials; t++) {
+        const struct search_trial *trial = &search->trial[t];
+        if (trial->step != step || !trial->fit.sound) {
+            continue;
+        }
+        /* the kind that this trial has beyond the rest of the best model */
+        const struct effect_kind *own = NULL;
+        size_t others = 0;
+        for (size_t e = 0; e < trial->fit.model.count; e++) {
+            if (names_kind(rest, trial->fit.model.effect[e].kind)) {
+                others++;
+            } else {
+                own = trial->fit.model.effect[e].kind;
+            }
+        }
+        if (own == NULL || others < rest->count) {
+            continue;
+        }
+        const double cost = held_out(&trial->fit);
+        size_t at = 0;
+        while (at < *count && kinds[at] != own) {
+            at++;
+        }
+        if (at == *count && *count < SEARCH_CANDIDATES_MAX) {
+            kinds[(*count)++] = own;
+            belief[at] = cost;
+        } else if (at < *count) {
+            belief[at] = fmin(belief[at], cost);
+        }
+        best = fmin(best, cost);
+        worst = fmax(worst, cost);
+    }
+    const double before = step == 0 ? held_out(&search->recalibrated) : worst;
+    const double noise = best / fmax(search->best.sums.pressure_count[1] + search->best.sums.tip_count[1], 1.0);
+    const double scale = BELIEF_SHARE * fmax(before - best, 0.0) + 4.0 * noise;
+    double sum = 0.0;
+    for (size_t i = 0; i < *count; i++) {
+        belief[i] = exp(-(belief[i] - best) / scale);
+        sum += belief[i];
+    }
+    for (size_t i = 0; i < *count; i++) {
+        belief[i] /= sum;
+    }
+}
+
+static void name_group(struct diagnosis *diagnosis, const double *belief, const struct effect_kind *const *kinds,
+                       size_t count) {
+    for (size_t i = 0; i < count; i++) {
+        if (belief[i] < GROUP_LEAST || diagnosis->group == DIAGNOSIS_NAMES_MAX) {
+            continue;
+        }
+        size_t at = diagnosis->group++;
+        for (; at > 0 && diagnosis->group_probability[at - 1] < belief[i]; at--) {
+            diagnosis->group_name[at] = diagnosis->group_name[at - 1];
+            diagnosis->group_probability[at] = diagnosis->group_probability[at - 1];
+        }
+        diagnosis->group_name[at] = kinds[i]->name;
+        diagnosis->group_probability[at] = belief[i];
+    }
+}
+
+/* Residuals' dependence in time makes the fit's own covariance too small by this. */
+static double inflation(const struct search *search) {
+    const struct fit *fit = &search->best;
+    const double mean2 = fit_mean_square(&fit->sums, 1);
+    return fmax(mean2, 0.3) * 3.0;
+}
+
+static struct diagnosis_interval interval_of(const struct search *search, size_t index, double value) {
+    const double spread = NINETY_PERCENT * sqrt(fmax(search->everything.covariance[index][index], 0.0) * inflation(search));
+    return (struct diagnosis_interval){value, value - spread, value + spread};
+}
+
+static void take_effects(struct diagnosis *diagnosis, const struct search *search) {
+    const struct gap_model *model = &search->everything.model;
+    size_t index = 2;
+    diagnosis->stiffness_scale = interval_of(search, 0, model->stiffness_scale);
+    diagnosis->supply_scale = interval_of(search, 1, model->supply_scale);
+    diagnosis->effects = model->count;
+    for (size_t e = 0; e < model->count; e++) {
+        const struct effect *effect = &model->effect[e];
+        struct diagnosis_effect *out = &diagnosis->effect[e];
+        *out = (struct diagnosis_effect){.kind = effect->kind, .chamber = effect->chamber, .onset_s = effect->onset_s};
+        for (size_t i = 0; i < effect->kind->parameter_count; i++) {
+            const bool fixed = effect->kind->by_chance && i == 0;
+            out->parameter[i] = fixed ? (struct diagnosis_interval){effect->parameter[i], effect->parameter[i] * 0.9,
+                                                                    effect->parameter[i] * 1.1}
+                                      : interval_of(search, index++, effect->parameter[i]);
+        }
+    }
+}
+
+static void believe(struct diagnosis *diagnosis, const struct search *search) {
+    double belief[SEARCH_CANDIDATES_MAX];
+    const struct effect_kind *kinds[SEARCH_CANDIDATES_MAX];
+    size_t count = 0;
+    for (size_t e = 0; e < diagnosis->effects; e++) {
+        struct gap_model rest = search->best.model;
+        memmove(&rest.effect[e], &rest.effect[e + 1], (rest.count - e - 1) * sizeof rest.effect[0]);
+        rest.count--;
+        weigh_kinds(search, search->best.model.count - 1, belief, kinds, &count, &rest);
+        for (size_t i = 0; i < count; i++) {
+            if (kinds[i] == diagnosis->effect[e].kind) {
+                diagnosis->effect[e].probability = belief[i];
+            }
+        }
+        if (diagnosis->effects == 1 || diagnosis->effect[e].probability < SURE) {
+            name_group(diagnosis, belief, kinds, count);
+        }
+    }
+}
+
+/* --- where --- */
+
+static void locate(struct diagnosis *diagnosis) {
+    diagnosis->stage = "";
+    (void)snprintf(diagnosis->regime, sizeof diagnosis->regime, "whole run");
+    if (diagnosis->effects == 0) {
+        return;
+    }
+    const struct diagnosis_effect *first = &diagnosis->effect[0];
+    diagnosis->stage = effect_stage_name(first->kind->stage);
+    for (size_t e = 0; e < diagnosis->effects; e++) {
+        const struct diagnosis_effect *effect = &diagnosis->effect[e];
+        for (size_t c = 0; c < 3; c++) {
+            diagnosis->chamber[c] = diagnosis->chamber[c] || effect->chamber == 0 || effect->chamber == c + 1;
+        }
+    }
+    if (first->onset_s > 0.0) {
+        (void)snprintf(diagnosis->regime, sizeof diagnosis->regime, "from %.1f s on", first->onset_s);
+    }
+}
+
+/* --- verdict --- */
+
+static void decide(struct diagnosis *diagnosis, const struct search *search) {
+    const double before = diagnosis->structure[0], recalibrated = diagnosis->structure[1], best = diagnosis->structure[2];
+    if (search->best.model.count == 0) {
+        if (recalibrated > fmax(STRUCTURE_NONE, RECALIBRATED_SHARE * before)) {
+            diagnosis->verdict = GAP_UNKNOWN;
+        } else {
+            diagnosis->verdict = before > fmax(STRUCTURE_NONE, 2.0 * recalibrated) ? GAP_RECALIBRATE : GAP_NONE;
+        }
+        return;
+    }
+    if (best > STRUCTURE_NONE && best > (1.0 - CLOSED_LEAST) * recalibrated) {
+        diagnosis->verdict = GAP_UNKNOWN;
+        return;
+    }
+    for (size_t e = 0; e < diagnosis->effects; e++) {
+        if (diagnosis->effect[e].probability < SURE) {
+            diagnosis->verdict = GAP_GROUP;
+            return;
+        }
+    }
+    diagnosis->verdict = diagnosis->effects > 1 ? GAP_EFFECTS : GAP_EFFECT;
+}
+
+static void describe_data(struct diagnosis *diagnosis, const struct search *search) {
+    const struct gap_run *run = &search->data->run[0];
+    if (!run->has_duty) {
+        diagnosis_warn(diagnosis, "no duties in the log: supply, valve and line effects cannot be told apart; record valve1..3");
+    }
+    if (!run->has_reading) {
+        diagnosis_warn(diagnosis, "no measured pressures: what happens before and after the chambers cannot be separated; record p1_pa..p3_pa");
+    }
+    if (run->tips == 0) {
+        diagnosis_warn(diagnosis, "no tip samples: nothing can be said of body and tip sensor; record tip_x_m.. and tip_qw..");
+    } else if (!run->has_orientation) {
+        diagnosis_warn(diagnosis, "no tip orientation: body and tip sensor cannot be told apart by comparing it with the position");
+    }
+    if (!run->has_supply) {
+        diagnosis_warn(diagnosis, "the supply was not measured: its constant part is refitted, and its droop is seen by the chambers only");
+    }
+}
+
+bool diagnosis_conclude(struct diagnosis *diagnosis, struct search *search) {
+    memset(diagnosis, 0, sizeof *diagnosis);
+    if (!measure_gaps(diagnosis, search)) {
+        return false;
+    }
+    describe_data(diagnosis, search);
+    take_effects(diagnosis, search);
+    believe(diagnosis, search);
+    locate(diagnosis);
+    decide(diagnosis, search);
+    return true;
+}

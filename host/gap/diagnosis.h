@@ -1,0 +1,75 @@
+/* What a search found, said so that a person can act on it: verdict, where, which, how far. */
+#ifndef TRIBEND_GAP_DIAGNOSIS_H
+#define TRIBEND_GAP_DIAGNOSIS_H
+
+#include "gap/search.h"
+
+#define DIAGNOSIS_NAMES_MAX 8
+#define DIAGNOSIS_WARNINGS_MAX 12
+#define DIAGNOSIS_TEXT_BYTES 320
+#define DIAGNOSIS_RESIDUALS 5
+
+enum gap_verdict {
+    GAP_NONE,
+    GAP_RECALIBRATE,
+    GAP_EFFECT,
+    GAP_EFFECTS,
+    GAP_GROUP,
+    GAP_UNKNOWN,
+    GAP_INSUFFICIENT_DATA,
+    GAP_VERDICT_COUNT
+};
+
+struct diagnosis_interval {
+    double value;
+    double low; /* 90 % */
+    double high;
+};
+
+struct diagnosis_effect {
+    const struct effect_kind *kind;
+    size_t chamber;
+    double onset_s;
+    double probability;
+    struct diagnosis_interval parameter[EFFECT_PARAMETERS_MAX];
+};
+
+/* Root mean square of one residual on held-out data, in its own unit. */
+struct diagnosis_gap {
+    const char *name;
+    const char *unit;
+    bool measured;
+    double before;
+    double after_recalibration;
+    double after_effect;
+    double floor;
+};
+
+struct diagnosis {
+    enum gap_verdict verdict;
+    const char *stage;      /* of the locus; "" where there is none */
+    bool chamber[3];
+    char regime[DIAGNOSIS_TEXT_BYTES];
+    size_t effects;
+    struct diagnosis_effect effect[GAP_EFFECTS_MAX];
+    size_t group;
+    const char *group_name[DIAGNOSIS_NAMES_MAX];
+    double group_probability[DIAGNOSIS_NAMES_MAX];
+    struct diagnosis_interval stiffness_scale;
+    struct diagnosis_interval supply_scale;
+    struct diagnosis_gap gap[DIAGNOSIS_RESIDUALS];
+    struct diagnosis_interval closed;                /* share of the gap closed by everything */
+    struct diagnosis_interval closed_recalibration;  /* by recalibration alone */
+    double structure[3];    /* share of noise floor squared that is left: nominal, recalibrated, best */
+    char description[DIAGNOSIS_TEXT_BYTES];          /* of an unknown gap */
+    char next_experiment[DIAGNOSIS_TEXT_BYTES];
+    size_t warnings;
+    char warning[DIAGNOSIS_WARNINGS_MAX][DIAGNOSIS_TEXT_BYTES];
+};
+
+const char *gap_verdict_name(enum gap_verdict verdict);
+/* Draws the conclusions. False: out of memory. */
+bool diagnosis_conclude(struct diagnosis *diagnosis, struct search *search);
+void diagnosis_warn(struct diagnosis *diagnosis, const char *format, ...) __attribute__((format(printf, 2, 3)));
+
+#endif

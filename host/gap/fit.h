@@ -1,0 +1,63 @@
+/* Fitting a model's parameters to the residuals that are not held out: Levenberg and Marquardt's method within bounds.
+ *
+ * Replaying the gas is what costs. So a base keeps the replayed pressures of one model with how they move with its two
+ * nominal parameters; models whose effects all lie downstream of the pressures are evaluated from it alone, and others
+ * take the nominal columns of their Jacobian from it. */
+#ifndef TRIBEND_GAP_FIT_H
+#define TRIBEND_GAP_FIT_H
+
+#include "gap/replay.h"
+
+struct fit_base {
+    struct gap_model model; /* its downstream effects do not matter here */
+    struct replay_state state;
+    struct replay_state moved[2]; /* derivatives by stiffness and supply scale */
+};
+
+/* Sums of squares of whitened residuals and their counts: [0] fitted, [1] held out. */
+struct fit_sums {
+    double pressure[2];
+    double tip[2];
+    double pressure_count[2];
+    double tip_count[2];
+};
+
+struct fit {
+    struct gap_model model;
+    struct fit_sums sums;
+    double covariance[GAP_PARAMETERS_MAX][GAP_PARAMETERS_MAX]; /* of the parameters, residuals taken as independent */
+    size_t parameters;
+    size_t evaluations;
+    bool sound;
+};
+
+/* A thread's room to work in. */
+struct fitter {
+    const struct replay *replay;
+    const struct fit_base *base;
+    struct replay_state state;
+    struct replay_state trial;
+    double *residual;
+    double *moved;
+    double *jacobian; /* [GAP_PARAMETERS_MAX][residuals] */
+    bool use_all;          /* fit to the held-out residuals too */
+    bool wants_covariance; /* else fit->covariance stays zero, which saves a Jacobian */
+};
+
+bool fit_base_open(struct fit_base *base, const struct replay *replay, const struct gap_model *model);
+void fit_base_close(struct fit_base *base, const struct replay *replay);
+bool fitter_open(struct fitter *fitter, const struct replay *replay, const struct fit_base *base);
+void fitter_close(struct fitter *fitter);
+
+/* Residuals of a model into fitter->residual (and its pressures into fitter->state). */
+void fitter_evaluate(struct fitter *fitter, const struct gap_model *model);
+/* At most `rounds` steps from fit->model. `fit_nominal`: stiffness and supply move too. */
+void fitter_run(struct fitter *fitter, struct fit *fit, int rounds, bool fit_nominal);
+/* By how much pressure residuals would shrink, to first order, were the effect added to the base on all chambers [0] or on
+ * one [1..3] at some size; negative where only the opposite effect would help. */
+void fitter_linear(struct fitter *fitter, const struct fit_base *base, const double *base_residual,
+                   const struct effect *effect, double gain[4]);
+/* Mean square over pressure and tip, fitted or held out. */
+double fit_mean_square(const struct fit_sums *sums, int held_out);
+
+#endif

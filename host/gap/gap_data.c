@@ -1,0 +1,191 @@
+#include "gap/gap_data.h"
+
+#include <math.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "log/run_log.h"
+
+#define TIP_AGE_S 0.010      /* a pose is this old in the row in which it arrives (nominal sensor) */
+#define UNIT_TOLERANCE 0.05  /* of a quaternion's length */
+#define MOVED_M 3e-4         /* the tip has moved: an exact repeat then is no coincidence of the sensor's steps */
+
+static double cell(const struct run_log *log, size_t row, int column) {
+    return column < 0 ? NAN : log->value[row * log->columns + (size_t)column];
+}
+
+static bool fill3(const struct run_log *log, const char *const names[3], double *to, bool hold) {
+    bool any = false;
+    for (size_t c = 0; c < 3; c++) {
+        const int column = run_log_column(log, names[c]);
+        double last = hold ? 0.0 : NAN;
+        for (size_t row = 0; row < log->rows; row++) {
+            const double value = cell(log, row, column);
+            any = any || !isnan(value);
+            last = hold && isnan(value) ? last : value;
+            to[3 * row + c] = last;
+        }
+    }
+    return any;
+}
+
+/* A set-point that was written down as if measured says nothing: measured values are never all the same. */
+static bool fill1(const struct run_log *log, const char *name, double *to) {
+    const int column = run_log_column(log, name);
+    double first = NAN;
+    bool varies = false;
+    for (size_t row = 0; row < log->rows; row++) {
+        to[row] = cell(log, row, column);
+        first = isnan(first) ? to[row] : first;
+        varies = varies || (!isnan(to[row]) && to[row] != first);
+    }
+    return varies;
+}
+
+static bool is_repeat(const struct gap_tip *a, const struct gap_tip *b) {
+    return memcmp(a->position_m, b->position_m, sizeof a->position_m) == 0 &&
+           (isnan(a->quaternion[0]) || memcmp(a->quaternion, b->quaternion, sizeof a->quaternion) == 0);
+}
+
+static bool take_tip(struct gap_run *run, const struct run_log *log, size_t row, const int column[8]) {
+    struct gap_tip *tip = &run->tip[run->tips];
+    double size = 0.0;
+    *tip = (struct gap_tip){.time_s = run->time_s[row] - TIP_AGE_S};
+    for (size_t i = 0; i < 3; i++) {
+        tip->position_m[i] = cell(log, row, column[i]);
+    }
+    for (size_t i = 0; i < 4; i++) {
+        tip->quaternion[i] = cell(log, row, column[3 + i]);
+        size += tip->quaternion[i] * tip->quaternion[i];
+    }
+    if (isnan(tip->position_m[0] + tip->position_m[1] + tip->position_m[2])) {
+        return false;
+    }
+    const double status = cell(log, row, column[7]);
+    const bool wrong = !isnan(size) && fabs(sqrt(size) - 1.0) > UNIT_TOLERANCE;
+    if (wrong || (!isnan(status) && status != 0.0)) {
+        run->tips_skipped++;
+        return false;
+    }
+    run->has_orientation = run->has_orientation || !isnan(size);
+    return true;
+}
+
+static void count_repeats(struct gap_run *run) {
+    size_t moving = 0, repeated = 0;
+    for (size_t i = 1; i < run->tips; i++) {
+        const struct gap_tip *before = &run->tip[i - 1];
+        struct gap_tip *tip = &run->tip[i];
+        tip->repeated = is_repeat(tip, before);
+        /* moving: the next sample that is no repeat lies elsewhere */
+        size_t next = i + 1;
+        while (next < run->tips && is_repeat(&run->tip[next], before)) {
+            next++;
+        }
+        if (next < run->tips) {
+            double moved = 0.0;
+            for (size_t k = 0; k < 3; k++) {
+                moved = hypot(moved, run->tip[next].position_m[k] - before->position_m[k]);
+            }
+            moving += moved > MOVED_M;
+            repeated += moved > MOVED_M && tip->repeated;
+        }
+    }
+    run->repeated_share = moving > 20 ? (double)repeated / (double)moving : 0.0;
+}
+
+static bool out_of_memory(struct gap_run *run, char *error, size_t error_bytes) {
+    (void)snprintf(error, error_bytes, "%s: out of memory", run->path);
+    return false;
+}
+
+static bool take_log(struct gap_run *run, const struct run_log *log, char *error, size_t error_bytes) {
+    static const char *const duties[3] = {"valve1", "valve2", "valve3"};
+    static const char *const readings[3] = {"p1_pa", "p2_pa", "p3_pa"};
+    static const char *const commands[3] = {"p1_cmd_pa", "p2_cmd_pa", "p3_cmd_pa"};
+    static const char *const tips[8] = {"tip_x_m", "tip_y_m", "tip_z_m", "tip_qw",
+                                        "tip_qx",  "tip_qy",  "tip_qz",  "tip_status"};
+    int tip_column[8];
+    run->rows = log->rows;
+    run->time_s = malloc(log->rows * sizeof(double));
+    run->duty = malloc(3 * log->rows * sizeof(double));
+    run->reading_pa = malloc(3 * log->rows * sizeof(double));
+    run->command_pa = malloc(3 * log->rows * sizeof(double));
+    run->supply_pa = malloc(log->rows * sizeof(double));
+    run->temperature_k = malloc(log->rows * sizeof(double));
+    run->tip = malloc(log->rows * sizeof *run->tip);
+    if (run->time_s == NULL || run->duty == NULL || run->reading_pa == NULL || run->command_pa == NULL ||
+        run->supply_pa == NULL || run->temperature_k == NULL || run->tip == NULL) {
+        return out_of_memory(run, error, error_bytes);
+    }
+    const int time = run_log_column(log, "time_s");
+    for (size_t row = 0; row < log->rows; row++) {
+        run->time_s[row] = cell(log, row, time);
+    }
+    run->has_duty = fill3(log, duties, run->duty, true);
+    run->has_reading = fill3(log, readings, run->reading_pa, false);
+    run->has_command = fill3(log, commands, run->command_pa, true);
+    run->has_supply = fill1(log, "supply_pa", run->supply_pa);
+    run->has_temperature = fill1(log, "temperature_k", run->temperature_k);
+    for (size_t i = 0; i < 8; i++) {
+        tip_column[i] = run_log_column(log, tips[i]);
+    }
+    for (size_t row = 0; row < log->rows; row++) {
+        run->tips += take_tip(run, log, row, tip_column);
+    }
+    count_repeats(run);
+    return true;
+}
+
+bool gap_data_read(struct gap_data *data, const char *const *paths, size_t count, char *error, size_t error_bytes) {
+    memset(data, 0, sizeof *data);
+    if (count == 0 || count > GAP_RUNS_MAX) {
+        (void)snprintf(error, error_bytes, "a diagnosis takes 1 to %d run logs, not %zu", GAP_RUNS_MAX, count);
+        return false;
+    }
+    for (size_t i = 0; i < count; i++) {
+        struct run_log log;
+        struct gap_run *run = &data->run[data->runs++];
+        (void)snprintf(run->path, sizeof run->path, "%s", paths[i]);
+        bool taken = run_log_read(paths[i], &log, error, error_bytes);
+        if (taken) {
+            if (i == 0) {
+                (void)snprintf(data->module, sizeof data->module, "%s", log.module);
+            } else if (strcmp(data->module, log.module) != 0) {
+                (void)snprintf(error, error_bytes, "%s is of module %s, but %s of module %s: diagnose them apart", paths[i],
+                               log.module, paths[0], data->module);
+                taken = false;
+            }
+            taken = taken && take_log(run, &log, error, error_bytes);
+            run_log_free(&log);
+        }
+        if (!taken) {
+            gap_data_free(data);
+            return false;
+        }
+    }
+    return true;
+}
+
+void gap_data_free(struct gap_data *data) {
+    for (size_t i = 0; i < data->runs; i++) {
+        struct gap_run *run = &data->run[i];
+        free(run->time_s);
+        free(run->duty);
+        free(run->reading_pa);
+        free(run->command_pa);
+        free(run->supply_pa);
+        free(run->temperature_k);
+        free(run->tip);
+    }
+    memset(data, 0, sizeof *data);
+}
+
+double gap_data_duration_s(const struct gap_data *data) {
+    double sum_s = 0.0;
+    for (size_t i = 0; i < data->runs; i++) {
+        sum_s += data->run[i].time_s[data->run[i].rows - 1] - data->run[i].time_s[0];
+    }
+    return sum_s;
+}

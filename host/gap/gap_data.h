@@ -1,0 +1,53 @@
+/* What a diagnosis reads of a run log: the columns that it can use, by row, and the tip samples. SI units. */
+#ifndef TRIBEND_GAP_DATA_H
+#define TRIBEND_GAP_DATA_H
+
+#include <stdbool.h>
+#include <stddef.h>
+#include <stdint.h>
+
+#define GAP_RUNS_MAX 64
+#define GAP_PATH_BYTES 256
+
+struct gap_tip {
+    double time_s;        /* when the pose was true: the row's time less the sensor's nominal age */
+    double position_m[3];
+    double quaternion[4]; /* w, x, y, z; NAN where only the position was measured */
+    bool repeated;        /* the same words as the sample before */
+};
+
+struct gap_run {
+    char path[GAP_PATH_BYTES];
+    size_t rows;
+    double *time_s;
+    double *duty;          /* [rows * 3]; holds from its row on */
+    double *reading_pa;    /* [rows * 3]; NAN where not measured */
+    double *command_pa;    /* [rows * 3] */
+    double *supply_pa;     /* [rows] */
+    double *temperature_k; /* [rows] */
+    bool has_duty;
+    bool has_reading;
+    bool has_command;
+    bool has_supply;       /* measured: it is not one constant value */
+    bool has_temperature;
+    bool has_orientation;
+    size_t tips;
+    struct gap_tip *tip;
+    size_t tips_skipped;   /* with a status bit set, or a quaternion that is none */
+    double repeated_share; /* of the samples taken while the tip moved */
+};
+
+struct gap_data {
+    size_t runs;
+    struct gap_run run[GAP_RUNS_MAX];
+    char module[256];
+    bool from_simulator; /* the baseline is another simulator's output, in sim_tip_* and sim_p* columns */
+};
+
+/* Reads the logs. False: `error` names file, line, column and remedy. */
+bool gap_data_read(struct gap_data *data, const char *const *paths, size_t count, char *error, size_t error_bytes);
+void gap_data_free(struct gap_data *data);
+/* Seconds from the first row to the last, over all runs. */
+double gap_data_duration_s(const struct gap_data *data);
+
+#endif

@@ -1,0 +1,43 @@
+#include "gap/gap_model.h"
+
+#include <math.h>
+
+#define STIFFNESS_LEAST 0.4
+#define STIFFNESS_MOST 2.5
+#define SUPPLY_LEAST 0.6
+#define SUPPLY_MOST 1.5
+
+static double scale_of(const struct effect_parameter *parameter) {
+    const double from_none = isnan(parameter->none) ? 0.0 : fabs(parameter->typical - parameter->none);
+    if (from_none > 0.0) {
+        return from_none;
+    }
+    return parameter->typical != 0.0 ? 0.5 * fabs(parameter->typical) : 0.25 * (parameter->most - parameter->least);
+}
+
+size_t gap_model_parameters(struct gap_model *model, struct gap_parameter parameter[GAP_PARAMETERS_MAX]) {
+    size_t count = 0;
+    parameter[count++] = (struct gap_parameter){
+        "stiffness_scale", "1", STIFFNESS_LEAST, STIFFNESS_MOST, 0.05, &model->stiffness_scale, -1};
+    parameter[count++] =
+        (struct gap_parameter){"supply_scale", "1", SUPPLY_LEAST, SUPPLY_MOST, 0.05, &model->supply_scale, -1};
+    for (size_t e = 0; e < model->count; e++) {
+        struct effect *effect = &model->effect[e];
+        for (size_t i = effect->kind->by_chance ? 1 : 0; i < effect->kind->parameter_count; i++) {
+            const struct effect_parameter *kind = &effect->kind->parameter[i];
+            parameter[count++] = (struct gap_parameter){
+                kind->name, kind->unit, kind->least, kind->most, scale_of(kind), &effect->parameter[i], (int)e};
+        }
+    }
+    return count;
+}
+
+bool gap_effect_upstream(const struct effect_kind *kind) {
+    return effect_has(kind, EFFECT_HOOK_COMMAND) || effect_has(kind, EFFECT_HOOK_GAS) ||
+           effect_has(kind, EFFECT_HOOK_READING);
+}
+
+bool gap_effect_downstream(const struct effect_kind *kind) {
+    return effect_has(kind, EFFECT_HOOK_LOAD) || effect_has(kind, EFFECT_HOOK_SHAPE) ||
+           effect_has(kind, EFFECT_HOOK_POSE);
+}

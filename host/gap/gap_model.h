@@ -1,0 +1,34 @@
+/* A model of the module: its nominal parameters and the effects that are added. */
+#ifndef TRIBEND_GAP_MODEL_H
+#define TRIBEND_GAP_MODEL_H
+
+#include "sim/plant.h"
+
+#define GAP_EFFECTS_MAX 4
+#define GAP_PARAMETERS_MAX (2 + GAP_EFFECTS_MAX * EFFECT_PARAMETERS_MAX)
+
+struct gap_model {
+    double stiffness_scale;
+    double supply_scale;
+    size_t count;
+    struct effect effect[GAP_EFFECTS_MAX];
+};
+
+/* One adjustable number of a model: nominal 0 (stiffness) and 1 (supply), then the effects' parameters in their order. */
+struct gap_parameter {
+    const char *name;
+    const char *unit;
+    double least;
+    double most;
+    double scale; /* a change of this size matters */
+    double *value;
+    int effect; /* -1: nominal */
+};
+
+/* Fills `parameter`; returns how many. Parameters that data cannot move (probabilities) are left out. */
+size_t gap_model_parameters(struct gap_model *model, struct gap_parameter parameter[GAP_PARAMETERS_MAX]);
+/* Does the effect act before the pressure readings (supply, valves, pressure sensors)? */
+bool gap_effect_upstream(const struct effect_kind *kind);
+bool gap_effect_downstream(const struct effect_kind *kind);
+
+#endif

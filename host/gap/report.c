@@ -1,0 +1,257 @@
+#include "gap/report.h"
+
+#include <jansson.h>
+#include <math.h>
+#include <string.h>
+
+#include "program/output_file.h"
+
+/* --- text --- */
+
+/* In the unit that people use: mm, deg, ms, kPa, ml. */
+struct shown_unit {
+    const char *si;
+    double above;
+    double factor;
+    const char *unit;
+};
+
+static void print_value(FILE *out, const struct diagnosis_interval *interval, const char *unit) {
+    static const struct shown_unit units[] = {
+        {"m", 0.0, 1e3, "mm"}, {"rad", 0.0, 180.0 / M_PI, "deg"}, {"Pa", 0.0, 1e-3, "kPa"}, {"m3", 0.0, 1e6, "ml"},
+        {"kg", 0.0, 1e3, "g"}};
+    double factor = 1.0;
+    const char *name = strcmp(unit, "1") == 0 ? "" : unit;
+    for (size_t i = 0; i < sizeof units / sizeof units[0]; i++) {
+        if (strcmp(units[i].si, unit) == 0) {
+            factor = units[i].factor;
+            name = units[i].unit;
+        }
+    }
+    fprintf(out, "%.3g (%.3g to %.3g)%s%s", factor * interval->value, factor * interval->low, factor * interval->high,
+            *name != '\0' ? " " : "", name);
+}
+
+static void print_effect(FILE *out, const struct diagnosis_effect *effect) {
+    fprintf(out, "which     %s", effect->kind->name);
+    if (effect->chamber > 0) {
+        fprintf(out, ", chamber %zu", effect->chamber);
+    }
+    if (effect->onset_s > 0.0) {
+        fprintf(out, ", from %.1f s on", effect->onset_s);
+    }
+    fprintf(out, " (probability %.2f): %s\n", effect->probability, effect->kind->what);
+    for (size_t i = 0; i < effect->kind->parameter_count; i++) {
+        fprintf(out, "            %s ", effect->kind->parameter[i].name);
+        print_value(out, &effect->parameter[i], effect->kind->parameter[i].unit);
+        fprintf(out, "\n");
+    }
+}
+
+static void print_verdict(FILE *out, const struct diagnosis *diagnosis) {
+    static const char *const meaning[GAP_VERDICT_COUNT] = {
+        [GAP_NONE] = "the module does what the model says, within the noise",
+        [GAP_RECALIBRATE] = "nominal parameters explain it; nothing is missing from the model",
+        [GAP_EFFECT] = "one effect that the model leaves out explains it",
+        [GAP_EFFECTS] = "several effects that the model leaves out explain it together",
+        [GAP_GROUP] = "several effects explain it equally well; this data cannot tell them apart",
+        [GAP_UNKNOWN] = "there is a real gap that no effect of the catalogue explains",
+        [GAP_INSUFFICIENT_DATA] = "the data cannot say"};
+    fprintf(out, "verdict   %s: %s\n", gap_verdict_name(diagnosis->verdict), meaning[diagnosis->verdict]);
+}
+
+static void print_where(FILE *out, const struct diagnosis *diagnosis) {
+    if (*diagnosis->stage == '\0') {
+        return;
+    }
+    fprintf(out, "where     %s", diagnosis->stage);
+    const bool all = diagnosis->chamber[0] && diagnosis->chamber[1] && diagnosis->chamber[2];
+    for (size_t c = 0; c < 3 && !all; c++) {
+        if (diagnosis->chamber[c]) {
+            fprintf(out, ", chamber %zu", c + 1);
+        }
+    }
+    fprintf(out, ", %s\n", diagnosis->regime);
+}
+
+void gap_report_text(const struct diagnosis *diagnosis, const struct gap_data *data, FILE *out) {
+    print_verdict(out, diagnosis);
+    print_where(out, diagnosis);
+    if (diagnosis->verdict == GAP_GROUP) {
+        fprintf(out, "which    ");
+        for (size_t i = 0; i < diagnosis->group; i++) {
+            fprintf(out, " %s (%.2f)", diagnosis->group_name[i], diagnosis->group_probability[i]);
+        }
+        fprintf(out, "\n");
+    }
+    const bool named = diagnosis->verdict == GAP_EFFECT || diagnosis->verdict == GAP_EFFECTS;
+    for (size_t e = 0; e < diagnosis->effects && named; e++) {
+        print_effect(out, &diagnosis->effect[e]);
+    }
+    if (diagnosis->verdict == GAP_UNKNOWN) {
+        fprintf(out, "what      %s\n", diagnosis->description);
+    }
+    if (diagnosis->verdict != GAP_INSUFFICIENT_DATA) {
+        fprintf(out, "nominal   stiffness x ");
+        print_value(out, &diagnosis->stiffness_scale, "1");
+        fprintf(out, ", supply x ");
+        print_value(out, &diagnosis->supply_scale, "1");
+        fprintf(out, "\nhow far   %.0f %% of the gap closed (%.0f to %.0f %%); by recalibration alone %.0f %%\n",
+                100.0 * diagnosis->closed.value, 100.0 * diagnosis->closed.low, 100.0 * diagnosis->closed.high,
+                100.0 * diagnosis->closed_recalibration.value);
+        fprintf(out, "          on held-out data, rms       before   recalibrated   with effect    noise floor\n");
+    }
+    for (size_t k = 0; k < DIAGNOSIS_RESIDUALS; k++) {
+        const struct diagnosis_gap *gap = &diagnosis->gap[k];
+        if (gap->measured) {
+            fprintf(out, "          %-20s %10.4g %14.4g %13.4g %14.4g %s\n", gap->name, gap->before,
+                    gap->after_recalibration, gap->after_effect, gap->floor, gap->unit);
+        }
+    }
+    if (*diagnosis->next_experiment != '\0') {
+        fprintf(out, "next      %s\n", diagnosis->next_experiment);
+    }
+    for (size_t i = 0; i < diagnosis->warnings; i++) {
+        fprintf(out, "note      %s\n", diagnosis->warning[i]);
+    }
+    (void)data;
+}
+
+/* --- JSON --- */
+
+static json_t *interval_json(const struct diagnosis_interval *interval, const char *unit) {
+    json_t *object = json_pack("{s:f,s:f,s:f}", "value", interval->value, "low", interval->low, "high", interval->high);
+    if (unit != NULL) {
+        json_object_set_new(object, "unit", json_string(unit));
+    }
+    return object;
+}
+
+static json_t *number_or_null(double value) {
+    return isfinite(value) ? json_real(value) : json_null();
+}
+
+static json_t *effect_json(const struct diagnosis_effect *effect) {
+    json_t *parameters = json_object();
+    for (size_t i = 0; i < effect->kind->parameter_count; i++) {
+        json_object_set_new(parameters, effect->kind->parameter[i].name,
+                            interval_json(&effect->parameter[i], effect->kind->parameter[i].unit));
+    }
+    return json_pack("{s:s,s:s,s:i,s:f,s:f,s:o}", "name", effect->kind->name, "stage",
+                     effect_stage_name(effect->kind->stage), "chamber", (int)effect->chamber, "onset_s",
+                     effect->onset_s, "probability", effect->probability, "parameters", parameters);
+}
+
+static json_t *effects_json(const struct diagnosis *diagnosis) {
+    json_t *list = json_array();
+    const bool named = diagnosis->verdict == GAP_EFFECT || diagnosis->verdict == GAP_EFFECTS ||
+                       diagnosis->verdict == GAP_GROUP;
+    for (size_t e = 0; e < diagnosis->effects && named; e++) {
+        json_array_append_new(list, effect_json(&diagnosis->effect[e]));
+    }
+    return list;
+}
+
+static json_t *gaps_json(const struct diagnosis *diagnosis) {
+    json_t *object = json_object();
+    for (size_t k = 0; k < DIAGNOSIS_RESIDUALS; k++) {
+        const struct diagnosis_gap *gap = &diagnosis->gap[k];
+        if (gap->measured) {
+            json_object_set_new(object, gap->name,
+                                json_pack("{s:o,s:o,s:o,s:o,s:s}", "before", number_or_null(gap->before),
+                                          "after_recalibration", number_or_null(gap->after_recalibration),
+                                          "after_effect", number_or_null(gap->after_effect), "floor",
+                                          number_or_null(gap->floor), "unit", gap->unit));
+        }
+    }
+    return object;
+}
+
+static json_t *report_json(const struct diagnosis *diagnosis, const struct gap_data *data) {
+    json_t *chambers = json_array(), *group = json_array(), *warnings = json_array(), *logs = json_array();
+    for (size_t c = 0; c < 3; c++) {
+        if (diagnosis->chamber[c]) {
+            json_array_append_new(chambers, json_integer((json_int_t)c + 1));
+        }
+    }
+    for (size_t i = 0; i < diagnosis->group && diagnosis->verdict == GAP_GROUP; i++) {
+        json_array_append_new(group, json_string(diagnosis->group_name[i]));
+    }
+    for (size_t i = 0; i < diagnosis->warnings; i++) {
+        json_array_append_new(warnings, json_string(diagnosis->warning[i]));
+    }
+    for (size_t i = 0; i < data->runs; i++) {
+        json_array_append_new(logs, json_string(data->run[i].path));
+    }
+    json_t *closed = interval_json(&diagnosis->closed, NULL);
+    json_object_set_new(closed, "recalibration", json_real(diagnosis->closed_recalibration.value));
+    return json_pack("{s:s,s:o,s:s,s:{s:s,s:o,s:s},s:o,s:o,s:{s:o,s:o},s:o,s:o,s:s,s:s,s:o}", "verdict",
+                     gap_verdict_name(diagnosis->verdict), "logs", logs, "module", data->module, "locus", "stage",
+                     diagnosis->stage, "chambers", chambers, "regime", diagnosis->regime, "effects",
+                     effects_json(diagnosis), "group", group, "nominal", "stiffness_scale",
+                     interval_json(&diagnosis->stiffness_scale, "1"), "supply_scale",
+                     interval_json(&diagnosis->supply_scale, "1"), "gap", gaps_json(diagnosis), "closed_fraction",
+                     closed, "description", diagnosis->description, "next_experiment", diagnosis->next_experiment,
+                     "warnings", warnings);
+}
+
+bool gap_report_json(const struct diagnosis *diagnosis, const struct gap_data *data, const char *path, char *error,
+                     size_t error_bytes) {
+    struct output_file file;
+    json_t *report = report_json(diagnosis, data);
+    if (report == NULL) {
+        (void)snprintf(error, error_bytes, "%s: the report could not be put together", path);
+        return false;
+    }
+    if (!output_file_open(&file, path, error, error_bytes)) {
+        json_decref(report);
+        return false;
+    }
+    const int status = json_dumpf(report, file.stream, JSON_INDENT(2) | JSON_REAL_PRECISION(8));
+    fputc('\n', file.stream);
+    json_decref(report);
+    if (status != 0) {
+        output_file_discard(&file);
+        (void)snprintf(error, error_bytes, "%s: the report could not be written", path);
+        return false;
+    }
+    return output_file_commit(&file, error, error_bytes);
+}
+
+/* --- calibration --- */
+
+static void write_interval(FILE *out, const char *indent, const char *name, const struct diagnosis_interval *interval,
+                           const char *unit) {
+    fprintf(out, "%s%s: { value: %.8g, low: %.8g, high: %.8g, unit: \"%s\" }\n", indent, name, interval->value,
+            interval->low, interval->high, unit);
+}
+
+bool gap_report_calibration(const struct diagnosis *diagnosis, const struct gap_data *data, const char *path,
+                            char *error, size_t error_bytes) {
+    struct output_file file;
+    if (!output_file_open(&file, path, error, error_bytes)) {
+        return false;
+    }
+    FILE *out = file.stream;
+    const bool named = diagnosis->verdict == GAP_EFFECT || diagnosis->verdict == GAP_EFFECTS;
+    fprintf(out, "# tribend calibration: what a diagnosis found; intervals are 90 %%\nmodule: %s\nverdict: %s\nlogs:\n",
+            data->module, gap_verdict_name(diagnosis->verdict));
+    for (size_t i = 0; i < data->runs; i++) {
+        fprintf(out, "  - \"%s\"\n", data->run[i].path);
+    }
+    write_interval(out, "", "stiffness_scale", &diagnosis->stiffness_scale, "1");
+    write_interval(out, "", "supply_scale", &diagnosis->supply_scale, "1");
+    fprintf(out, "effects:%s\n", named && diagnosis->effects > 0 ? "" : " []");
+    for (size_t e = 0; e < diagnosis->effects && named; e++) {
+        const struct diagnosis_effect *effect = &diagnosis->effect[e];
+        fprintf(out, "  - name: %s\n    chamber: %zu\n    onset_s: %.6g\n    parameters:\n", effect->kind->name,
+                effect->chamber, effect->onset_s);
+        for (size_t i = 0; i < effect->kind->parameter_count; i++) {
+            const struct diagnosis_interval *value = &effect->parameter[i];
+            fprintf(out, "      - { name: %s, value: %.8g, low: %.8g, high: %.8g, unit: \"%s\" }\n",
+                    effect->kind->parameter[i].name, value->value, value->low, value->high,
+                    effect->kind->parameter[i].unit);
+        }
+    }
+    return output_file_commit(&file, error, error_bytes);
+}

@@ -1,0 +1,541 @@
+#include "gap/search.h"
+
+#include <math.h>
+#include <omp.h>
+#include <stdlib.h>
+#include <string.h>
+
+#define STARTS_MAX 4
+#define SCREEN_ROUNDS 1
+#define REFINE_ROUNDS 6
+#define NOMINAL_ROUNDS 6
+#define REFINED_MAX 8         /* of the screened candidates */
+#define PAIRED_MAX 6          /* the best alone, of which all pairs are tried */
+#define EFFECTS_MOST 3        /* on one module at once */
+#define GAIN_SHARE 0.03       /* an effect must take off this share of the held-out squares .. */
+#define GAIN_SIGMA 40.0       /* .. and so much that noise does not */
+#define REPEATS_LEAST 0.02    /* share of repeated samples below which none is frozen */
+#define ONSETS 12
+#define SHORTLIST 10          /* of the candidates that act on the gas; the best variant of each kind besides */
+
+struct candidate {
+    const struct effect_kind *kind;
+    size_t chamber;
+};
+
+/* --- the catalogue --- */
+
+static bool is_without(const struct search_options *options, const char *name) {
+    for (size_t i = 0; i < options->without_count; i++) {
+        if (strcmp(options->without[i], name) == 0) {
+            return true;
+        }
+    }
+    return false;
+}
+
+static bool has_everywhere(const struct gap_data *data, size_t offset_of_flag) {
+    bool all = true;
+    for (size_t i = 0; i < data->runs; i++) {
+        all = all && *(const bool *)((const char *)&data->run[i] + offset_of_flag);
+    }
+    return all;
+}
+
+/* Can the data tell anything of this effect at all? */
+static bool can_show(const struct gap_data *data, const struct effect_kind *kind) {
+    const bool duties = has_everywhere(data, offsetof(struct gap_run, has_duty));
+    const bool readings = has_everywhere(data, offsetof(struct gap_run, has_reading));
+    const bool tips = data->run[0].tips > 0;
+    double repeated = 0.0;
+    for (size_t i = 0; i < data->runs; i++) {
+        repeated = fmax(repeated, data->run[i].repeated_share);
+    }
+    if (kind->by_chance) {
+        return repeated > REPEATS_LEAST;
+    }
+    if (gap_effect_downstream(kind)) {
+        return tips;
+    }
+    if (kind->stage == EFFECT_STAGE_PRESSURE_SENSOR) {
+        return readings && (duties || tips);
+    }
+    return duties && (readings || tips);
+}
+
+static size_t list_candidates(const struct search *search, struct candidate *list) {
+    size_t count = 0;
+    for (size_t i = 0; i < effect_kind_count(); i++) {
+        const struct effect_kind *kind = effect_kind_at(i);
+        if (is_without(&search->options, kind->name) || !can_show(search->data, kind)) {
+            continue;
+        }
+        const size_t first = kind->scope == EFFECT_ONE_CHAMBER ? 1 : 0, last = kind->scope == EFFECT_GLOBAL ? 0 : 3;
+        for (size_t c = first; c <= last && count < SEARCH_CANDIDATES_MAX; c++) {
+            list[count++] = (struct candidate){kind, c};
+        }
+    }
+    return count;
+}
+
+/* Van der Corput's sequence in a base: well spread starts. */
+static double spread(size_t index, size_t base) {
+    double value = 0.0, share = 1.0 / (double)base;
+    for (; index > 0; index /= base, share /= (double)base) {
+        value += share * (double)(index % base);
+    }
+    return value;
+}
+
+static double within(const struct effect_parameter *parameter, double share) {
+    if (parameter->least > 0.0 && parameter->most / parameter->least > 20.0) {
+        return parameter->least * pow(parameter->most / parameter->least, share);
+    }
+    return parameter->least + share * (parameter->most - parameter->least);
+}
+
+/* The k-th start: typical; the other way round; then secondary parameters spread over their bounds. */
+static size_t place_start(const struct effect_kind *kind, size_t k, struct effect *effect) {
+    static const size_t bases[EFFECT_PARAMETERS_MAX] = {2, 3, 5};
+    bool sign = false, secondary = false;
+    for (size_t i = 0; i < kind->parameter_count; i++) {
+        const struct effect_parameter *parameter = &kind->parameter[i];
+        const double mirrored = 2.0 * parameter->none - parameter->typical;
+        sign = sign || (!isnan(parameter->none) && mirrored >= parameter->least && mirrored <= parameter->most);
+        secondary = secondary || isnan(parameter->none);
+    }
+    for (size_t i = 0; i < kind->parameter_count && k > 0; i++) {
+        const struct effect_parameter *parameter = &kind->parameter[i];
+        const double mirrored = 2.0 * parameter->none - parameter->typical;
+        const bool mirrors = !isnan(parameter->none) && mirrored >= parameter->least && mirrored <= parameter->most;
+        if (mirrors && k % 2 == 1) {
+            effect->parameter[i] = mirrored;
+        } else if (isnan(parameter->none)) {
+            effect->parameter[i] = within(parameter, 0.1 + 0.8 * spread(k, bases[i]));
+        }
+    }
+    return secondary ? STARTS_MAX : sign ? 2 : 1;
+}
+
+/* --- fits --- */
+
+static double held_out(const struct fit *fit) {
+    return fit->sound ? fit->sums.pressure[1] + fit->sums.tip[1] : INFINITY;
+}
+
+static double held_out_count(const struct fit *fit) {
+    return fit->sums.pressure_count[1] + fit->sums.tip_count[1];
+}
+
+static void add_effect(struct gap_model *model, const struct effect *effect) {
+    model->effect[model->count++] = *effect;
+}
+
+static double repeated_share(const struct gap_data *data) {
+    double share = 0.0;
+    for (size_t i = 0; i < data->runs; i++) {
+        share += data->run[i].repeated_share / (double)data->runs;
+    }
+    return share;
+}
+
+static void screen(struct fitter *fitter, const struct gap_data *data, const struct gap_model *onto,
+                   const struct candidate *candidate, struct fit *best) {
+    size_t starts = 1;
+    *best = (struct fit){.sound = false};
+    for (size_t k = 0; k < starts; k++) {
+        struct fit fit = {.model = *onto};
+        struct effect effect;
+        effect_init(&effect, candidate->kind);
+        effect.chamber = candidate->chamber;
+        starts = place_start(candidate->kind, k, &effect);
+        if (candidate->kind->by_chance) {
+            effect.parameter[0] = repeated_share(data);
+        }
+        add_effect(&fit.model, &effect);
+        fitter_run(fitter, &fit, SCREEN_ROUNDS, true);
+        const double mine = fit.sums.pressure[0] + fit.sums.tip[0], least = best->sums.pressure[0] + best->sums.tip[0];
+        if (fit.sound && (!best->sound || mine < least)) {
+            *best = fit;
+        }
+    }
+}
+
+struct crew {
+    struct fitter *fitter;
+    int count;
+};
+
+static void crew_close(struct crew *crew) {
+    for (int i = 0; i < crew->count; i++) {
+        fitter_close(&crew->fitter[i]);
+    }
+    free(crew->fitter);
+}
+
+static bool crew_open(struct crew *crew, const struct search *search, const struct fit_base *base) {
+    crew->count = 0;
+    const int wanted = search->options.threads > 0 ? search->options.threads : omp_get_max_threads();
+    crew->fitter = calloc((size_t)wanted, sizeof *crew->fitter);
+    for (; crew->fitter != NULL && crew->count < wanted; crew->count++) {
+        if (!fitter_open(&crew->fitter[crew->count], &search->replay, base)) {
+            break;
+        }
+    }
+    return crew->fitter != NULL && crew->count == wanted;
+}
+
+static bool stopped(const struct search *search) {
+    return search->options.stop != NULL && *search->options.stop != 0;
+}
+
+static void say(const struct search *search, const char *what, size_t done, size_t total) {
+    if (search->options.progress != NULL) {
+#pragma omp critical(search_progress)
+        search->options.progress(search->options.context, what, done, total);
+    }
+}
+
+static int by_held_out(const void *a, const void *b) {
+    const double x = held_out(*(const struct fit *const *)a), y = held_out(*(const struct fit *const *)b);
+    return (x > y) - (x < y);
+}
+
+static size_t model_has(const struct gap_model *model, const struct effect_kind *kind, size_t chamber) {
+    size_t found = 0;
+    for (size_t e = 0; e < model->count; e++) {
+        const struct effect *effect = &model->effect[e];
+        found += effect->kind == kind && (effect->chamber == chamber || effect->chamber == 0 || chamber == 0);
+    }
+    return found;
+}
+
+/* The gas is dear to replay. One replay of each kind on all chambers tells, to first order, what it could do on each; only
+ * the most promising are then tried in earnest. Marks the others as not wanted. */
+static void shortlist(struct search *search, struct crew *crew, const struct candidate *list, size_t count, bool *wanted) {
+    double gain[SEARCH_CANDIDATES_MAX] = {0.0};
+    struct fitter *first = &crew->fitter[0];
+    double *base_residual = malloc(search->replay.residuals * sizeof *base_residual);
+    for (size_t i = 0; i < count; i++) {
+        wanted[i] = true;
+    }
+    if (base_residual == NULL || !search->data->run[0].has_duty) {
+        free(base_residual);
+        return;
+    }
+    fitter_evaluate(first, &search->best.model);
+    memcpy(base_residual, first->residual, search->replay.residuals * sizeof *base_residual);
+#pragma omp parallel for schedule(dynamic, 1) num_threads(crew->count)
+    for (size_t i = 0; i < count; i++) {
+        const struct effect_kind *kind = list[i].kind;
+        const bool on_gas = effect_has(kind, EFFECT_HOOK_COMMAND) || effect_has(kind, EFFECT_HOOK_GAS);
+        if (!on_gas || (i > 0 && list[i - 1].kind == kind)) {
+            continue;
+        }
+        size_t starts = 1;
+        for (size_t k = 0; k < starts && k < 2; k++) {
+            struct effect effect;
+            double mine[4];
+            effect_init(&effect, kind);
+            effect.chamber = 0;
+            starts = place_start(kind, k, &effect);
+            fitter_linear(&crew->fitter[omp_get_thread_num()], crew->fitter[0].base, base_residual, &effect, mine);
+            for (size_t j = i; j < count && list[j].kind == kind; j++) {
+                gain[j] = fmax(gain[j], mine[list[j].chamber]);
+            }
+        }
+    }
+    for (size_t i = 0; i < count; i++) {
+        const struct effect_kind *kind = list[i].kind;
+        size_t above = 0, own_above = 0;
+        for (size_t j = 0; j < count; j++) {
+            const bool more = gain[j] > gain[i] || (gain[j] == gain[i] && j < i);
+            above += more;
+            own_above += more && list[j].kind == kind;
+        }
+        const bool on_gas = effect_has(kind, EFFECT_HOOK_COMMAND) || effect_has(kind, EFFECT_HOOK_GAS);
+        wanted[i] = !on_gas || above < SHORTLIST || own_above == 0;
+    }
+    free(base_residual);
+}
+
+/* All candidates on top of `onto`, coarsely; `order` gets those that are not hopeless, best first. */
+static size_t screen_all(struct search *search, struct crew *crew, const struct gap_model *onto,
+                         const struct candidate *list, size_t count, struct fit *fits, struct fit **order) {
+    size_t done = 0, kept = 0;
+    bool wanted[SEARCH_CANDIDATES_MAX];
+    shortlist(search, crew, list, count, wanted);
+#pragma omp parallel for schedule(dynamic, 1) num_threads(crew->count)
+    for (size_t i = 0; i < count; i++) {
+        fits[i] = (struct fit){.sound = false};
+        if (wanted[i] && !stopped(search) && model_has(onto, list[i].kind, list[i].chamber) == 0) {
+            screen(&crew->fitter[omp_get_thread_num()], search->data, onto, &list[i], &fits[i]);
+        }
+        size_t now;
+#pragma omp atomic capture
+        now = ++done;
+        say(search, list[i].kind->name, now, count);
+    }
+    for (size_t i = 0; i < count; i++) {
+        if (fits[i].sound) {
+            order[kept++] = &fits[i];
+        }
+    }
+    qsort(order, kept, sizeof *order, by_held_out);
+    return kept;
+}
+
+static void refine(struct search *search, struct crew *crew, struct fit **order, size_t count, size_t step) {
+#pragma omp parallel for schedule(dynamic, 1) num_threads(crew->count)
+    for (size_t i = 0; i < count; i++) {
+        if (!stopped(search)) {
+            fitter_run(&crew->fitter[omp_get_thread_num()], order[i], REFINE_ROUNDS, true);
+        }
+    }
+    qsort(order, count, sizeof *order, by_held_out);
+    for (size_t i = 0; i < count && search->trials < SEARCH_TRIED_MAX; i++) {
+        search->trial[search->trials++] = (struct search_trial){*order[i], step};
+    }
+}
+
+/* Does the second explain so much more that its effect has earned its place? */
+static bool is_better(const struct fit *before, const struct fit *after) {
+    const double gain = held_out(before) - held_out(after);
+    const double noise = fmax(held_out(after) / held_out_count(after), 0.2);
+    return gain > GAIN_SHARE * held_out(before) && gain > GAIN_SIGMA * noise;
+}
+
+/* Is what the best model leaves more than noise? */
+static bool is_structured(const struct fit *fit) {
+    return fit_mean_square(&fit->sums, 1) > 1.1;
+}
+
+/* Fit both scales; smoothing and weights follow the model that comes out. */
+static bool recalibrate(struct search *search, struct fit *fit, bool fit_nominal) {
+    struct replay_state state;
+    struct fit_base base;
+    struct fitter fitter;
+    bool sound = replay_state_open(&state, &search->replay);
+    for (int round = 0; round < 3 && sound; round++) {
+        sound = replay_tune(&search->replay, &fit->model, &state) && fit_base_open(&base, &search->replay, &fit->model);
+        if (!sound) {
+            break;
+        }
+        sound = fitter_open(&fitter, &search->replay, &base);
+        if (sound) {
+            fitter_run(&fitter, fit, fit_nominal ? NOMINAL_ROUNDS : 0, fit_nominal);
+            fitter_close(&fitter);
+        }
+        fit_base_close(&base, &search->replay);
+    }
+    replay_state_close(&state, &search->replay);
+    return sound;
+}
+
+/* When did each effect set in? Tried on a grid, kept where it explains more. */
+static void find_onsets(struct search *search, struct crew *crew, struct fit *fit) {
+    double end_s = 0.0;
+    for (size_t i = 0; i < search->data->runs; i++) {
+        const struct gap_run *run = &search->data->run[i];
+        end_s = fmax(end_s, run->time_s[run->rows - 1]);
+    }
+    for (size_t e = 0; e < fit->model.count; e++) {
+        struct fit trial[ONSETS];
+        const struct fit before = *fit;
+#pragma omp parallel for schedule(dynamic, 1) num_threads(crew->count)
+        for (size_t k = 0; k < ONSETS; k++) {
+            trial[k] = before;
+            trial[k].model.effect[e].onset_s = end_s * (double)(k + 1) / (ONSETS + 1.0);
+            fitter_run(&crew->fitter[omp_get_thread_num()], &trial[k], 2, true);
+        }
+        for (double width_s = end_s / (ONSETS + 1.0); width_s > 0.15; width_s *= 0.4) {
+            size_t best = 0;
+            for (size_t k = 1; k < ONSETS; k++) {
+                best = held_out(&trial[k]) < held_out(&trial[best]) ? k : best;
+            }
+            if (!is_better(fit, &trial[best])) {
+                break;
+            }
+            *fit = trial[best];
+            const double middle_s = fit->model.effect[e].onset_s;
+            const struct fit centre = *fit;
+#pragma omp parallel for schedule(dynamic, 1) num_threads(crew->count)
+            for (size_t k = 0; k < ONSETS; k++) {
+                trial[k] = centre;
+                trial[k].model.effect[e].onset_s =
+                    fmax(middle_s + width_s * (2.0 * (double)k / (ONSETS - 1.0) - 1.0), 0.0);
+                fitter_run(&crew->fitter[omp_get_thread_num()], &trial[k], 1, true);
+            }
+            for (size_t k = 0; k < ONSETS; k++) {
+                if (held_out(&trial[k]) < held_out(fit)) {
+                    *fit = trial[k];
+                }
+            }
+        }
+    }
+}
+
+/* Each pair of the best alone, from where each ended alone. */
+static size_t pair_up(struct fit *const *single, size_t singles, struct fit *pairs) {
+    size_t count = 0;
+    for (size_t i = 0; i < singles; i++) {
+        for (size_t j = i + 1; j < singles; j++) {
+            const struct effect *other = &single[j]->model.effect[0];
+            if (model_has(&single[i]->model, other->kind, other->chamber) == 0) {
+                pairs[count] = (struct fit){.model = single[i]->model};
+                add_effect(&pairs[count].model, other);
+                count++;
+            }
+        }
+    }
+    return count;
+}
+
+struct workspace {
+    struct candidate list[SEARCH_CANDIDATES_MAX];
+    size_t candidates;
+    struct fit fits[SEARCH_CANDIDATES_MAX];
+    struct fit *order[SEARCH_CANDIDATES_MAX];
+    struct fit single[PAIRED_MAX];
+    size_t singles;
+    struct fit pairs[PAIRED_MAX * PAIRED_MAX];
+    struct fit *pair_order[PAIRED_MAX * PAIRED_MAX];
+};
+
+/* One more effect on top of the best model. True: one was found. */
+static bool add_one(struct search *search, struct workspace *room, size_t step) {
+    struct fit_base base;
+    struct crew crew = {NULL, 0};
+    struct fit next = search->best;
+    bool found = false;
+    if (fit_base_open(&base, &search->replay, &search->best.model) && crew_open(&crew, search, &base)) {
+        size_t count = screen_all(search, &crew, &search->best.model, room->list, room->candidates, room->fits, room->order);
+        count = count < REFINED_MAX ? count : REFINED_MAX;
+        refine(search, &crew, room->order, count, step);
+        if (count > 0 && is_better(&search->best, room->order[0])) {
+            next = *room->order[0];
+            found = true;
+        }
+        for (size_t i = 0; step == 0 && i < count && i < PAIRED_MAX; i++) {
+            room->single[room->singles++] = *room->order[i];
+        }
+        if (step == 1) {
+            struct fit *singles[PAIRED_MAX];
+            for (size_t i = 0; i < room->singles; i++) {
+                singles[i] = &room->single[i];
+            }
+            const size_t pairs = pair_up(singles, room->singles, room->pairs);
+            for (size_t i = 0; i < pairs; i++) {
+                room->pair_order[i] = &room->pairs[i];
+            }
+            say(search, "pairs", 0, pairs);
+            refine(search, &crew, room->pair_order, pairs, step);
+            if (pairs > 0 && held_out(room->pair_order[0]) < held_out(&next) &&
+                is_better(&search->best, room->pair_order[0])) {
+                next = *room->pair_order[0];
+                found = true;
+            }
+        }
+        if (found && is_structured(&next) && !stopped(search)) {
+            find_onsets(search, &crew, &next);
+        }
+    }
+    crew_close(&crew);
+    fit_base_close(&base, &search->replay);
+    search->best = next;
+    return found;
+}
+
+/* Leave out again what no longer earns its place. */
+static void drop_idle(struct search *search) {
+    struct fit_base base;
+    struct crew crew = {NULL, 0};
+    bool dropped = search->best.model.count > 1;
+    while (dropped) {
+        dropped = false;
+        for (size_t e = 0; e < search->best.model.count && search->best.model.count > 1; e++) {
+            struct fit without = search->best;
+            memmove(&without.model.effect[e], &without.model.effect[e + 1],
+                    (without.model.count - e - 1) * sizeof without.model.effect[0]);
+            without.model.count--;
+            if (fit_base_open(&base, &search->replay, &without.model) && crew_open(&crew, search, &base)) {
+                fitter_run(&crew.fitter[0], &without, REFINE_ROUNDS, true);
+            }
+            crew_close(&crew);
+            fit_base_close(&base, &search->replay);
+            if (!is_better(&without, &search->best)) {
+                search->best = without;
+                dropped = true;
+                break;
+            }
+        }
+    }
+}
+
+static bool prepare(struct search *search) {
+    struct replay_state state;
+    const bool sound = replay_state_open(&state, &search->replay) &&
+                       replay_prepare(&search->replay, &search->nominal.model, &state);
+    replay_state_close(&state, &search->replay);
+    return sound;
+}
+
+/* What the reports say of parameters comes from all the data. */
+static bool fit_everything(struct search *search) {
+    struct fit_base base;
+    struct fitter fitter;
+    bool sound = fit_base_open(&base, &search->replay, &search->best.model);
+    search->everything = search->best;
+    if (sound) {
+        sound = fitter_open(&fitter, &search->replay, &base);
+        if (sound) {
+            fitter.use_all = true;
+            fitter.wants_covariance = true;
+            fitter_run(&fitter, &search->everything, REFINE_ROUNDS, true);
+            fitter_close(&fitter);
+        }
+        fit_base_close(&base, &search->replay);
+    }
+    return sound;
+}
+
+bool search_run(struct search *search, const struct gap_data *data, const struct bend_table *table,
+                const struct plant_parameters *nominal, const struct search_options *options) {
+    struct workspace *room = calloc(1, sizeof *room);
+    memset(search, 0, sizeof *search);
+    search->data = data;
+    search->options = *options;
+    const struct gap_model plain = {.stiffness_scale = 1.0, .supply_scale = 1.0};
+    search->nominal.model = plain;
+    bool sound = room != NULL && replay_open(&search->replay, data, table, nominal);
+    say(search, "recalibration", 0, 1);
+    sound = sound && prepare(search);
+    sound = sound && recalibrate(search, &search->nominal, false);
+    search->recalibrated.model = plain;
+    sound = sound && recalibrate(search, &search->recalibrated, true);
+    search->best = search->recalibrated;
+    if (sound) {
+        room->candidates = list_candidates(search, room->list);
+    }
+    for (size_t step = 0; step < EFFECTS_MOST && sound && !stopped(search); step++) {
+        if (step > 0 && !is_structured(&search->best)) {
+            break;
+        }
+        if (!add_one(search, room, step)) {
+            break;
+        }
+        sound = recalibrate(search, &search->best, true);
+    }
+    if (sound && !stopped(search)) {
+        drop_idle(search);
+        sound = recalibrate(search, &search->best, true);
+    }
+    sound = sound && fit_everything(search);
+    search->interrupted = stopped(search);
+    free(room);
+    return sound;
+}
+
+void search_close(struct search *search) {
+    replay_close(&search->replay);
+}

@@ -1,0 +1,37 @@
+/* One case of a corpus: which effects, how strong, on which rig; its two runs; and how large a gap they leave. */
+#ifndef TRIBEND_BLIND_CASE_H
+#define TRIBEND_BLIND_CASE_H
+
+#include "blind_log.h"
+#include "blind_run.h"
+
+#define BLIND_RUNS 2
+#define BLIND_ID_BYTES 12
+#define BLIND_GROUP_MAX 4
+
+struct blind_case {
+    char id[BLIND_ID_BYTES];
+    const char *corpus;
+    const char *verdict; /* the answer to give */
+    struct blind_effect effect[BLIND_EFFECTS_MAX];
+    double effect_gap[BLIND_EFFECTS_MAX]; /* what each alone is worth, of the noise floor */
+    size_t effects;
+    const char *group[BLIND_GROUP_MAX]; /* what the data cannot tell apart */
+    size_t groups;
+    const char *removed; /* from the catalogue at run time; NULL: none */
+    bool faint;          /* made so weak that the gap is one to three times the floor */
+    enum blind_excitation_kind excitation;
+    struct blind_rig rig[BLIND_RUNS];
+    struct blind_log_form form;
+    struct blind_record record[BLIND_RUNS];
+    double gap_ratio; /* greatest over the channels, against the same duties without any effect */
+};
+
+/* The name of a corpus that can be drawn, or NULL. */
+const char *blind_corpus_find(const char *name);
+/* Draws case `index` of a corpus and runs it. False: `blind_case_close` all the same; out of memory, or no draw fitted. */
+bool blind_case_open(struct blind_case *blind, struct blind_field *field, uint64_t seed, const char *corpus, size_t index,
+                     double seconds);
+void blind_case_close(struct blind_case *blind);
+
+#endif
