@@ -1,6 +1,7 @@
-/* The order of a step: estimate pressures, look for gaps to the model, learn from the tip, look for faults, take the
- * command, let the supervisor decide, compute the targets, write duties. State that lives here: the command being
- * followed and when it came, when the last tip sample came, and each chamber's capacity from the table. */
+/* The order of a step: correct what the sensors say, estimate pressures, look for gaps to the model, learn from the tip,
+ * look for faults, take the command, let the supervisor decide, compute the targets, write duties. State that lives here:
+ * the command being followed and when it came, when the last tip sample came, each chamber's capacity from the table, and
+ * how far a body that is known to creep has crept. */
 #include "control/controller.h"
 
 #include <stddef.h>
@@ -9,6 +10,7 @@
 
 #define SUPPLY_LEAST_PA 1000.0f
 #define SELFTEST_PRESSURE_PA 2000.0f
+#define CREEP_STEPS 10u /* control steps between looks at the creep, which takes a hundred times as long */
 
 void controller_default_parameters(struct controller_parameters *parameters, const struct bend_table *table) {
     *parameters = (struct controller_parameters){
@@ -17,6 +19,7 @@ void controller_default_parameters(struct controller_parameters *parameters, con
     tip_loop_default_parameters(&parameters->tip_loop);
     limits_default_parameters(&parameters->limits, table);
     gap_monitor_default_parameters(&parameters->gap_monitor);
+    calibration_none(&parameters->calibration);
 }
 
 void controller_init(struct controller *controller, const struct bend_table *table,
@@ -26,19 +29,59 @@ void controller_init(struct controller *controller, const struct bend_table *tab
     limits_init(&controller->limits);
     tip_loop_init(&controller->tip_loop);
     gap_monitor_init(&controller->gap_monitor);
+    struct controller_calibration *calibration = &controller->parameters.calibration;
+    controller->status.calibration_limited = calibration_limit(calibration);
+    calibration_frames_of(calibration, &controller->frames);
+    controller->creeps = calibration_creeps(calibration);
     for (uint32_t c = 0; c < 3u; c++) {
         pressure_loop_init(&controller->pressure_loop[c]);
-        controller->capacity_m3[c] = parameters->pressure_loop.nominal_capacity_m3;
+        calibration_apply(calibration, c, &parameters->pressure_loop, &controller->loop_parameters[c]);
+        controller->capacity_m3[c] = controller->loop_parameters[c].nominal_capacity_m3;
     }
     controller->tip_lost = true;
     controller->status.state = SUPERVISOR_BOOT;
+}
+
+/* --- calibration --- */
+
+/* The pressures and the pose behind what the sensors say. */
+static void correct(const struct controller *controller, struct controller_input *input) {
+    const struct controller_calibration *calibration = &controller->parameters.calibration;
+    const float noise_pa = controller->parameters.pressure_loop.sensor_noise_pa;
+    for (uint32_t c = 0; c < 3u; c++) {
+        input->pressure_pa[c] = calibration_pressure(calibration, c, input->pressure_pa[c], noise_pa,
+                                                     controller->pressure_loop[c].estimate_pa);
+    }
+    input->tip_measured_us -= calibration->tip_late_us;
+    calibration_pose(&controller->frames, input->tip_position_m, input->tip_quaternion);
+}
+
+/* By implicit Euler steps, so that no time constant is too short for them. */
+static void follow_creep(struct controller *controller) {
+    const struct controller_calibration *calibration = &controller->parameters.calibration;
+    float elastic_rad[2], *known_rad = controller->tip_loop.known_rad;
+    if (!controller->creeps || controller->table == NULL || controller->step % CREEP_STEPS != 0u) {
+        return;
+    }
+    tip_loop_predict(controller->table, controller->status.pressure_estimate_pa, elastic_rad);
+    const float step_s = 1e-6f * (float)(CREEP_STEPS * (uint32_t)CONTROLLER_STEP_US);
+    for (uint32_t i = 0; i < 2u; i++) {
+        known_rad[i] = 0.0f;
+        for (uint32_t k = 0; k < CALIBRATION_CREEP_TERMS; k++) {
+            const float share = step_s / (calibration->creep_time_s[k] + step_s);
+            const float end_rad = calibration->creep_share[k] * elastic_rad[i];
+            controller->crept_rad[k][i] += share * (end_rad - controller->crept_rad[k][i]);
+            known_rad[i] += controller->crept_rad[k][i];
+        }
+    }
+    controller->targets_stale = true;
 }
 
 /* --- pressures --- */
 
 /* V + p_abs dV/dp of chamber `c` with its tube; the pull of the other chambers on V is left to the observer. */
 static float capacity_of(const struct controller *controller, const struct bend_table_stencil *stencil, uint32_t c) {
-    const struct pressure_loop_parameters *parameters = &controller->parameters.pressure_loop;
+    const struct pressure_loop_parameters *parameters = &controller->loop_parameters[c];
     const float length_m = controller->table->module.chamber_length_m;
     float gradient[3];
     const float volume_m2 = bend_table_gradient(
@@ -53,9 +96,9 @@ static float supply_of(const struct controller *controller, const struct control
 }
 
 static void estimate(struct controller *controller, const struct controller_input *input) {
-    const struct pressure_loop_parameters *parameters = &controller->parameters.pressure_loop;
     float pressure_pa[3];
     for (uint32_t c = 0; c < 3u; c++) {
+        const struct pressure_loop_parameters *parameters = &controller->loop_parameters[c];
         struct pressure_loop *loop = &controller->pressure_loop[c];
         if (controller->step > 0u) {
             pressure_loop_predict(loop, parameters, supply_of(controller, input), controller->capacity_m3[c],
@@ -155,6 +198,10 @@ static void report_bend(struct controller *controller) {
         bend[0] += controller->tip_loop.correction_rad[0];
         bend[1] += controller->tip_loop.correction_rad[1];
     }
+    if (controller->tip_lost && controller->creeps) {
+        bend[0] += controller->tip_loop.known_rad[0];
+        bend[1] += controller->tip_loop.known_rad[1];
+    }
     controller->status.bend_rad = real_hypot(bend[0], bend[1]);
     controller->status.direction_rad = real_atan2(bend[1], bend[0]);
     controller->status.bend_is_measured = !controller->tip_lost;
@@ -191,9 +238,14 @@ static enum supervisor_request request_of(enum controller_command_kind kind) {
     }
 }
 
-/* Faults from this step's readings, the table's check and the age of the last command. */
-static uint32_t find_faults(struct controller *controller, const struct controller_input *input) {
-    uint32_t faults = limits_check_pressures(&controller->parameters.limits, input->pressure_pa, input->pressure_ok);
+/* Faults from this step's readings, the table's check and the age of the last command. Whether a sensor is broken shows in
+ * what it `shows` itself, whether a chamber bursts in the pressure behind that. */
+static uint32_t find_faults(struct controller *controller, const struct controller_input *input,
+                            const struct controller_input *shows) {
+    const struct limits_parameters *limits = &controller->parameters.limits;
+    uint32_t faults = limits_check_pressures(limits, shows->pressure_pa, shows->pressure_ok);
+    faults &= ~(1u << FAULT_OVERPRESSURE);
+    faults |= limits_check_pressures(limits, input->pressure_pa, input->pressure_ok);
     if (controller->table != NULL &&
         limits_check_table(&controller->limits, &controller->parameters.limits, controller->table)) {
         faults |= 1u << FAULT_TABLE_CORRUPT;
@@ -206,9 +258,10 @@ static uint32_t find_faults(struct controller *controller, const struct controll
     return faults;
 }
 
-static void supervise(struct controller *controller, const struct controller_input *input) {
+static void supervise(struct controller *controller, const struct controller_input *input,
+                      const struct controller_input *shows) {
     const struct controller_command *command = &input->command;
-    const uint32_t present = find_faults(controller, input);
+    const uint32_t present = find_faults(controller, input, shows);
     bool healthy = true; /* the self-test waits until every chamber has vented, should it run into a restart */
     for (uint32_t c = 0; c < 3u; c++) {
         healthy = healthy && input->pressure_pa[c] < SELFTEST_PRESSURE_PA;
@@ -236,9 +289,9 @@ static void supervise(struct controller *controller, const struct controller_inp
 
 static void aim_at_bend(struct controller *controller) {
     const struct controller_command *command = &controller->active;
-    const float *correction = controller->tip_loop.correction_rad;
-    const float x = command->bend_rad * real_cos(command->direction_rad) - correction[0];
-    const float y = command->bend_rad * real_sin(command->direction_rad) - correction[1];
+    const float *correction = controller->tip_loop.correction_rad, *known = controller->tip_loop.known_rad;
+    const float x = command->bend_rad * real_cos(command->direction_rad) - correction[0] - known[0];
+    const float y = command->bend_rad * real_sin(command->direction_rad) - correction[1] - known[1];
     /* no bend wanted means no pressure, whatever the sensor's noise says */
     const bool none = !(command->bend_rad > 0.0f);
     const struct bend_inverse_request request = {none ? 0.0f : real_hypot(x, y), real_atan2(y, x),
@@ -286,10 +339,10 @@ static void aim(struct controller *controller) {
 
 static void drive(struct controller *controller, const struct controller_input *input,
                   struct controller_output *output) {
-    const struct pressure_loop_parameters *parameters = &controller->parameters.pressure_loop;
     output->valves_enabled = supervisor_valves_enabled(&controller->supervisor);
     output->supply_enabled = supervisor_supply_enabled(&controller->supervisor);
     for (uint32_t c = 0; c < 3u; c++) {
+        const struct pressure_loop_parameters *parameters = &controller->loop_parameters[c];
         struct pressure_loop *loop = &controller->pressure_loop[c];
         output->duty[c] = 0.0f;
         if (output->valves_enabled) {
@@ -304,12 +357,15 @@ static void drive(struct controller *controller, const struct controller_input *
 
 void controller_step(struct controller *controller, const struct controller_input *input,
                      struct controller_output *output) {
-    estimate(controller, input);
-    watch_gap(controller, input);
-    follow_tip(controller, input);
-    supervise(controller, input);
+    struct controller_input corrected = *input;
+    correct(controller, &corrected);
+    estimate(controller, &corrected);
+    follow_creep(controller);
+    watch_gap(controller, &corrected);
+    follow_tip(controller, &corrected);
+    supervise(controller, &corrected, input);
     aim(controller);
-    drive(controller, input, output);
+    drive(controller, &corrected, output);
     report_bend(controller);
     controller->step++;
     struct controller_status *status = &controller->status;

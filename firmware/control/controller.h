@@ -7,6 +7,7 @@
 
 #include "control/bend_inverse.h"
 #include "control/bend_table.h"
+#include "control/calibration.h"
 #include "control/pressure_loop.h"
 #include "control/tip_loop.h"
 #include "safety/gap_monitor.h"
@@ -43,6 +44,7 @@ struct controller_parameters {
     struct tip_loop_parameters tip_loop;
     struct limits_parameters limits;
     struct gap_monitor_parameters gap_monitor;
+    struct controller_calibration calibration; /* of this module and board; the identity by default */
 };
 
 struct controller_input {
@@ -81,6 +83,7 @@ struct controller_status {
     uint32_t tip_rejected;
     uint32_t tip_lost_count;
     uint32_t commands_refused;
+    uint32_t calibration_limited; /* numbers of the calibration that were out of bounds */
     struct gap_monitor_report gap;
 };
 
@@ -92,6 +95,10 @@ struct controller {
     struct supervisor supervisor;
     struct limits limits;
     struct pressure_loop pressure_loop[3];
+    struct pressure_loop_parameters loop_parameters[3]; /* each chamber's, calibrated */
+    struct calibration_frames frames;                   /* of the tip sensor */
+    bool creeps;
+    float crept_rad[CALIBRATION_CREEP_TERMS][2];
     struct tip_loop tip_loop;
     struct gap_monitor gap_monitor;
     struct gap_monitor_pose pose; /* the last good tip sample, for the gap monitor */

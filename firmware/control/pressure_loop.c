@@ -16,6 +16,7 @@ void pressure_loop_default_parameters(struct pressure_loop_parameters *parameter
         .close_delay_us = 1000,
         .ambient_pa_abs = 101325.0f,
         .flow_factor = 2e-10f * 1.185f * 287.0f * 293.15f,
+        .vent_factor = 2e-10f * 1.185f * 287.0f * 293.15f,
         .critical_ratio = 0.3f,
         .nominal_supply_pa = 40000.0f,
         .tube_volume_m3 = 2e-6f,
@@ -32,13 +33,14 @@ void pressure_loop_init(struct pressure_loop *loop) {
     *loop = (struct pressure_loop){.estimate_pa = 0.0f};
 }
 
-/* p V flow through valve and tube at 293.15 K (ISO 6358-1:2013): zero against the pressure. */
-static float gas_flow(const struct pressure_loop_parameters *parameters, float up_pa_abs, float down_pa_abs) {
+/* p V flow through an opening at 293.15 K (ISO 6358-1:2013): zero against the pressure. */
+static float gas_flow(const struct pressure_loop_parameters *parameters, float factor, float up_pa_abs,
+                      float down_pa_abs) {
     if (!(up_pa_abs > down_pa_abs)) {
         return 0.0f;
     }
     const float ratio = down_pa_abs / up_pa_abs, b = parameters->critical_ratio;
-    const float choked = parameters->flow_factor * up_pa_abs;
+    const float choked = factor * up_pa_abs;
     if (ratio <= b) {
         return choked;
     }
@@ -51,8 +53,15 @@ static void rates(const struct pressure_loop *loop, const struct pressure_loop_p
                   float pressure_pa, float supply_pa, float capacity_m3, float *fill, float *vent) {
     const float chamber_pa_abs = parameters->ambient_pa_abs + pressure_pa;
     const float capacity = real_max(capacity_m3, CAPACITY_LEAST_M3);
-    *fill = (gas_flow(parameters, parameters->ambient_pa_abs + supply_pa, chamber_pa_abs) + loop->bias) / capacity;
-    *vent = (gas_flow(parameters, chamber_pa_abs, parameters->ambient_pa_abs) - loop->bias) / capacity;
+    float gained = loop->bias;
+    if (parameters->leak_factor > 0.0f) {
+        gained -= gas_flow(parameters, parameters->leak_factor, chamber_pa_abs, parameters->ambient_pa_abs);
+    }
+    const float filled =
+        gas_flow(parameters, parameters->flow_factor, parameters->ambient_pa_abs + supply_pa, chamber_pa_abs);
+    const float vented = gas_flow(parameters, parameters->vent_factor, chamber_pa_abs, parameters->ambient_pa_abs);
+    *fill = (filled + gained) / capacity;
+    *vent = (vented - gained) / capacity;
 }
 
 static int64_t most(int64_t a, int64_t b) {
@@ -63,33 +72,57 @@ static int64_t least(int64_t a, int64_t b) {
     return a < b ? a : b;
 }
 
+/* A valve that is late still has pulses before the last one ahead of it. */
+static void keep_pulse(struct pressure_loop *loop) {
+    const uint32_t last = loop->earlier_count < PRESSURE_LOOP_EARLIER ? loop->earlier_count : PRESSURE_LOOP_EARLIER - 1u;
+    for (uint32_t i = last; i > 0u; i--) {
+        loop->earlier[i] = loop->earlier[i - 1u];
+    }
+    loop->earlier[0] = (struct pressure_loop_pulse){loop->open_at_us, loop->close_at_us};
+    loop->earlier_count = last + 1u;
+}
+
 /* The period that starts at `start_us` takes over the duty written last. A valve that is still open when its coil is
  * energised again stays open; a pulse shorter than the open delay does not open it. */
 static void start_period(struct pressure_loop *loop, const struct pressure_loop_parameters *parameters,
                          int64_t start_us) {
     loop->duty = loop->duty_next;
     const int64_t on_us = (int64_t)(loop->duty * (float)parameters->pwm_period_us + 0.5f);
-    const bool still_open = loop->open_at_us < start_us && loop->close_at_us > start_us;
+    const int64_t seen_us = start_us + parameters->late_us;
+    const bool still_open = loop->open_at_us < seen_us && loop->close_at_us > seen_us;
     if (on_us > 0 && still_open) {
-        loop->close_at_us = start_us + on_us + parameters->close_delay_us;
+        loop->close_at_us = seen_us + on_us + parameters->close_delay_us;
     } else if (on_us > parameters->open_delay_us) {
-        loop->open_at_us = start_us + parameters->open_delay_us;
-        loop->close_at_us = start_us + on_us + parameters->close_delay_us;
+        if (parameters->late_us > 0) {
+            keep_pulse(loop);
+        }
+        loop->open_at_us = seen_us + parameters->open_delay_us;
+        loop->close_at_us = seen_us + on_us + parameters->close_delay_us;
     }
+}
+
+/* Of the time between the two, how long the valve fills. */
+static int64_t filling_us(const struct pressure_loop *loop, int64_t from_us, int64_t to_us) {
+    int64_t sum_us = most(0, least(to_us, loop->close_at_us) - most(from_us, loop->open_at_us));
+    for (uint32_t i = 0; i < loop->earlier_count; i++) {
+        const struct pressure_loop_pulse *pulse = &loop->earlier[i];
+        sum_us += most(0, least(to_us, pulse->close_at_us) - most(from_us, pulse->open_at_us));
+    }
+    return sum_us;
 }
 
 void pressure_loop_predict(struct pressure_loop *loop, const struct pressure_loop_parameters *parameters,
                            float supply_pa, float capacity_m3, int64_t time_us, int64_t step_us) {
-    const int64_t from_us = time_us - step_us;
-    const int64_t open_us = most(0, least(time_us, loop->close_at_us) - most(from_us, loop->open_at_us));
-    const float share = (float)open_us / (float)step_us;
+    const float share = (float)filling_us(loop, time_us - step_us, time_us) / (float)step_us;
+    const float step_s = (float)step_us * SECONDS_PER_US;
     float fill = 0.0f, vent = 0.0f;
     rates(loop, parameters, loop->estimate_pa, supply_pa, capacity_m3, &fill, &vent);
-    loop->estimate_pa += (float)step_us * SECONDS_PER_US * (share * fill - (1.0f - share) * vent);
-    const float bias_pa = (float)step_us * SECONDS_PER_US * loop->bias / real_max(capacity_m3, CAPACITY_LEAST_M3);
+    loop->estimate_pa += step_s * (share * fill - (1.0f - share) * vent);
+    const float bias_pa = step_s * loop->bias / real_max(capacity_m3, CAPACITY_LEAST_M3);
     const float modelled_pa = real_max(loop->estimate_pa - bias_pa, 0.0f);
     loop->estimate_pa = real_max(loop->estimate_pa, 0.0f);
     loop->unmodelled_pa = loop->estimate_pa - modelled_pa;
+    loop->shown_pa += step_s / (parameters->reading_lag_s + step_s) * (loop->estimate_pa - loop->shown_pa);
     if (time_us % parameters->pwm_period_us == 0) {
         start_period(loop, parameters, time_us); /* with the duty of the step before: this one's comes too late */
     }
@@ -98,7 +131,7 @@ void pressure_loop_predict(struct pressure_loop *loop, const struct pressure_loo
 void pressure_loop_correct(struct pressure_loop *loop, const struct pressure_loop_parameters *parameters,
                            float measured_pa, float capacity_m3, int64_t step_us) {
     const float clip_pa = CLIPPED_SIGMAS * parameters->sensor_noise_pa;
-    const float innovation_pa = measured_pa - loop->estimate_pa;
+    const float innovation_pa = measured_pa - (parameters->reading_lag_s > 0.0f ? loop->shown_pa : loop->estimate_pa);
     if (loop->estimate_pa < clip_pa && measured_pa < 1.5f * clip_pa) {
         loop->innovation_pa = 0.0f;
         loop->unmodelled_pa = 0.0f;
@@ -107,7 +140,9 @@ void pressure_loop_correct(struct pressure_loop *loop, const struct pressure_loo
     loop->innovation_pa += INNOVATION_SHARE * (innovation_pa - loop->innovation_pa);
     const bool off = real_abs(loop->innovation_pa) > INNOVATION_SIGMAS * parameters->sensor_noise_pa;
     const float predicted_pa = loop->estimate_pa;
-    loop->estimate_pa += (off ? parameters->gain_fast : parameters->gain) * innovation_pa;
+    const float step_pa = (off ? parameters->gain_fast : parameters->gain) * innovation_pa;
+    loop->estimate_pa += step_pa;
+    loop->shown_pa += step_pa;
     loop->estimate_pa = real_max(loop->estimate_pa, 0.0f);
     loop->unmodelled_pa += loop->estimate_pa - predicted_pa;
     loop->bias += parameters->bias_gain_per_s * (float)step_us * SECONDS_PER_US * innovation_pa * capacity_m3;
@@ -149,39 +184,72 @@ static float pulse_from_open(const struct pressure_loop_parameters *parameters, 
     return pulse_us > period_us - 0.5f * close_us ? period_us : period_us - close_us;
 }
 
+/* Where the pressure will be at `seen_us`, through the pulses that are already on their way. At most a period at a time,
+ * so that rates keep up with the pressure. */
+static float forecast(const struct pressure_loop *loop, const struct pressure_loop_parameters *parameters,
+                      float supply_pa, float capacity_m3, int64_t time_us, int64_t start_us, int64_t seen_us) {
+    float pressure_pa = loop->estimate_pa;
+    int64_t from_us = time_us, to_us = start_us;
+    while (from_us < seen_us) {
+        float fill = 0.0f, vent = 0.0f;
+        rates(loop, parameters, pressure_pa, supply_pa, capacity_m3, &fill, &vent);
+        const float filling_s = (float)filling_us(loop, from_us, to_us) * SECONDS_PER_US;
+        const float left_s = (float)(to_us - from_us) * SECONDS_PER_US;
+        pressure_pa = real_max(0.0f, pressure_pa + fill * filling_s - vent * (left_s - filling_s));
+        from_us = to_us;
+        to_us = least(to_us + parameters->pwm_period_us, seen_us);
+    }
+    return pressure_pa;
+}
+
+/* The nearest duty that a valve with a dead band can be given, as the valve takes it. */
+static float beyond_dead_band(const struct pressure_loop_parameters *parameters, float duty) {
+    if (!(parameters->least_duty > 0.0f)) {
+        return duty;
+    }
+    const float least = (parameters->least_duty - parameters->lost_duty) / (1.0f - parameters->lost_duty);
+    return duty < 0.5f * least ? 0.0f : real_max(duty, least);
+}
+
+/* The duty to write for it. */
+static float through_dead_band(const struct pressure_loop_parameters *parameters, float duty) {
+    const bool lossy = parameters->lost_duty > 0.0f && duty > 0.0f;
+    return lossy ? parameters->lost_duty + duty * (1.0f - parameters->lost_duty) : duty;
+}
+
 float pressure_loop_duty(struct pressure_loop *loop, const struct pressure_loop_parameters *parameters, float target_pa,
                          float supply_pa, float capacity_m3, int64_t time_us) {
     const int64_t period_us = parameters->pwm_period_us;
-    const int64_t left_us = period_us - time_us % period_us;
     const float period_s = (float)period_us * SECONDS_PER_US;
     if (!(target_pa > 0.0f)) {
         loop->duty_next = 0.0f;
         return 0.0f;
     }
-    /* where the pressure will be when the period starts */
-    float fill = 0.0f, vent = 0.0f;
-    rates(loop, parameters, loop->estimate_pa, supply_pa, capacity_m3, &fill, &vent);
-    const int64_t start_us = time_us + left_us;
-    const int64_t open_us = most(0, least(start_us, loop->close_at_us) - most(time_us, loop->open_at_us));
-    const float filling_s = (float)open_us * SECONDS_PER_US, left_s = (float)left_us * SECONDS_PER_US;
-    const float start_pa = real_max(0.0f, loop->estimate_pa + fill * filling_s - vent * (left_s - filling_s));
+    const int64_t start_us = time_us + period_us - time_us % period_us;
+    const int64_t seen_us = start_us + parameters->late_us;
+    const float start_pa = forecast(loop, parameters, supply_pa, capacity_m3, time_us, start_us, seen_us);
     /* what the period must do: end where a steady saw about the target starts */
+    float fill = 0.0f, vent = 0.0f;
     rates(loop, parameters, 0.5f * (start_pa + target_pa), supply_pa, capacity_m3, &fill, &vent);
     fill = real_max(fill, 1.0f);
     vent = real_max(vent, 0.0f);
     const float wait_s = (float)parameters->open_delay_us * SECONDS_PER_US;
     const float end_pa = target_pa - saw_offset(fill, vent, wait_s, period_s);
     const float fill_us = (end_pa - start_pa + vent * period_s) / (fill + vent) / SECONDS_PER_US;
-    const bool still_open = loop->open_at_us < start_us && loop->close_at_us > start_us;
+    const bool still_open = loop->open_at_us < seen_us && loop->close_at_us > seen_us;
     const float pulse_us =
         still_open ? pulse_from_open(parameters, fill_us) : pulse_from_closed(parameters, fill_us);
-    loop->duty_next = real_clamp(pulse_us / (float)period_us, 0.0f, 1.0f);
-    return loop->duty_next;
+    loop->duty_next = beyond_dead_band(parameters, real_clamp(pulse_us / (float)period_us, 0.0f, 1.0f));
+    return through_dead_band(parameters, loop->duty_next);
 }
 
 void pressure_loop_vent(struct pressure_loop *loop, const struct pressure_loop_parameters *parameters,
                         int64_t time_us) {
+    const int64_t shut_us = time_us + parameters->close_delay_us;
     loop->duty_next = 0.0f;
     loop->duty = 0.0f;
-    loop->close_at_us = least(loop->close_at_us, time_us + parameters->close_delay_us);
+    loop->close_at_us = least(loop->close_at_us, shut_us);
+    for (uint32_t i = 0; i < loop->earlier_count; i++) {
+        loop->earlier[i].close_at_us = least(loop->earlier[i].close_at_us, shut_us);
+    }
 }

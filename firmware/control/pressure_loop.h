@@ -3,12 +3,15 @@
  *
  * The valve always fills or vents, so pressure saws within each period; estimate and target are handled sample by
  * sample with that saw in mind. The observer's flow bias (leaks, wrong conductance) is the integral part; it is held
- * back by what the valve can do, so there is nothing to wind up. Units: Pa gauge unless _abs, m3, us. */
+ * back by what the valve can do, so there is nothing to wind up. A valve that is known to be late is driven by where the
+ * pressure will be when it sees the pulse. Units: Pa gauge unless _abs, m3, us. */
 #ifndef TRIBEND_PRESSURE_LOOP_H
 #define TRIBEND_PRESSURE_LOOP_H
 
 #include <stdbool.h>
 #include <stdint.h>
+
+#define PRESSURE_LOOP_EARLIER 7u /* pulses on their way to a valve that is late, beside the last one */
 
 struct pressure_loop_parameters {
     int64_t pwm_period_us;
@@ -16,6 +19,7 @@ struct pressure_loop_parameters {
     int64_t close_delay_us; /* from de-energising to vent */
     float ambient_pa_abs;
     float flow_factor;      /* C rho_ref R T, m3/s: times upstream absolute pressure gives p V flow, Pa m3/s */
+    float vent_factor;      /* the same while venting */
     float critical_ratio;   /* b of ISO 6358 */
     float nominal_supply_pa;
     float tube_volume_m3;
@@ -25,6 +29,18 @@ struct pressure_loop_parameters {
     float gain_fast;           /* while innovations do not average out */
     float bias_gain_per_s;     /* flow bias: share of innovation times capacity, for each second of step */
     float bias_limit;          /* Pa m3/s */
+    /* what a calibration may say of this chamber (calibration.h); zero otherwise */
+    int64_t late_us;           /* from a coil's pulse to the valve's, at most 60 ms */
+    float leak_factor;         /* of a leak to ambient, like flow_factor */
+    float reading_lag_s;       /* the sensor's time constant */
+    float least_duty;          /* smaller duties do nothing ... */
+    float lost_duty;           /* ... and larger ones act like (duty - lost) / (1 - lost) */
+};
+
+/* The valve fills within [open_at, close_at). */
+struct pressure_loop_pulse {
+    int64_t open_at_us;
+    int64_t close_at_us;
 };
 
 struct pressure_loop {
@@ -32,10 +48,13 @@ struct pressure_loop {
     float bias;           /* p V flow that the model does not know, Pa m3/s */
     float innovation_pa;  /* averaged over some 16 samples */
     float unmodelled_pa;  /* change of the estimate in this step that valve and gas do not explain: bias and readings */
-    float duty;           /* of the period under way */
+    float shown_pa;       /* what a sensor that lags shows of the estimate */
+    float duty;           /* of the period under way, as the valve takes it */
     float duty_next;      /* written, taken over at the next period */
     int64_t open_at_us;   /* the valve fills from here ... */
     int64_t close_at_us;  /* ... to here */
+    struct pressure_loop_pulse earlier[PRESSURE_LOOP_EARLIER]; /* newest first; only of a valve that is late */
+    uint32_t earlier_count;
 };
 
 /* Design page's nominal valve, gas and sensor. */

@@ -90,7 +90,7 @@ bool tip_loop_update(struct tip_loop *loop, const struct tip_loop_parameters *pa
     bend_table_locate(table, pressure_pa, &loop->stencil);
     predict_at(table, &loop->stencil, predicted);
     for (uint32_t i = 0; i < 2u; i++) {
-        loop->gap_rad[i] = measured[i] - predicted[i];
+        loop->gap_rad[i] = measured[i] - predicted[i] - loop->known_rad[i];
         loop->correction_rad[i] += parameters->gain * (loop->gap_rad[i] - loop->correction_rad[i]);
     }
     limit(loop->correction_rad, parameters->correction_limit_rad);

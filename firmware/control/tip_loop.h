@@ -19,6 +19,7 @@ struct tip_loop_parameters {
 
 struct tip_loop {
     float correction_rad[2];     /* measured minus predicted bend vector */
+    float known_rad[2];          /* what the table leaves out and the caller knows: part of what is predicted */
     float measured_rad[2];       /* of the last good sample */
     float gap_rad[2];            /* of the last sample that was compared: measured minus predicted */
     struct bend_table_stencil stencil; /* where the table was asked for it */

@@ -181,6 +181,7 @@ static void choose_grid(struct chambers *chambers, const struct gas_parameters *
 struct port {
     const struct gas_parameters *parameters;
     double conductance;
+    double vent_conductance;
     double leak_conductance;
     double supply_pa_abs; /* ambient while the shut-off valve is shut */
     double slope; /* of the pressure by the gas, 1/m3 */
@@ -191,9 +192,10 @@ struct port {
 static double valve_rate(const struct port *port, bool fills, double chamber_pa_abs) {
     const struct gas_parameters *parameters = port->parameters;
     const double other = fills ? port->supply_pa_abs : parameters->ambient_pa_abs;
-    double flow = gas_mass_flow(parameters, port->conductance, other, chamber_pa_abs);
+    const double conductance = fills ? port->conductance : port->vent_conductance;
+    double flow = gas_mass_flow(parameters, conductance, other, chamber_pa_abs);
     if (!fills || port->supply_open) {
-        flow -= gas_mass_flow(parameters, port->conductance, chamber_pa_abs, other);
+        flow -= gas_mass_flow(parameters, conductance, chamber_pa_abs, other);
     }
     return parameters->gas_constant * parameters->temperature_k * flow;
 }
@@ -243,6 +245,8 @@ void chambers_step(struct chambers *chambers, const struct gas_parameters *param
         const struct port port = {
             .parameters = parameters,
             .conductance = parameters->sonic_conductance * influence->conductance_scale[c],
+            .vent_conductance = parameters->sonic_conductance *
+                                (influence->conductance_scale[c] + influence->vent_scale_change[c]),
             .leak_conductance = influence->leak_conductance[c],
             .supply_pa_abs = parameters->ambient_pa_abs + (supply_open ? influence->supply_pa : 0.0),
             .slope = chambers->own_slope[c] / chambers->capacity[c][c],
@@ -261,6 +265,15 @@ void chambers_step(struct chambers *chambers, const struct gas_parameters *param
     }
     chambers->supply_flow_kgps =
         drawn / (parameters->gas_constant * parameters->temperature_k * 1e-6 * (double)(to_us - from_us));
+    for (size_t c = 0; c < 3; c++) {
+        const size_t next = (c + 1) % 3;
+        const double moved = influence->bridge_kgpspa[c] * (chambers->pressure_pa[c] - chambers->pressure_pa[next]) *
+                             parameters->gas_constant * parameters->temperature_k * 1e-6 * (double)(to_us - from_us);
+        change[c] -= moved;
+        change[next] += moved;
+        chambers->gas[c] -= moved;
+        chambers->gas[next] += moved;
+    }
     /* coordinates: the coupled linear step, then one Newton correction against the table */
     double step[3];
     solve3(chambers->capacity, change, step);

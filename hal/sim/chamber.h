@@ -42,9 +42,11 @@ struct chambers {
 /* What effects may change for a step: nominal one and zero. */
 struct chamber_influence {
     double conductance_scale[3];
+    double vent_scale_change[3]; /* added to the scale while the valve vents */
     double leak_conductance[3]; /* to ambient, m3/(s Pa) */
     double extra_volume_m3[3];
     double coupling[3][3];      /* [i][j]: share of chamber j's pressure that stands in chamber i on top of its own */
+    double bridge_kgpspa[3];    /* laminar leak from chamber i to the next (1 -> 2 -> 3 -> 1), kg/(s Pa) */
     double supply_pa;
 };
 

@@ -102,8 +102,10 @@ static void put_back(struct effect_signals *signals, const struct per_chamber *k
     }
     if (signals->influence != NULL) {
         signals->influence->conductance_scale[c] = kept->influence.conductance_scale[c];
+        signals->influence->vent_scale_change[c] = kept->influence.vent_scale_change[c];
         signals->influence->leak_conductance[c] = kept->influence.leak_conductance[c];
         signals->influence->extra_volume_m3[c] = kept->influence.extra_volume_m3[c];
+        signals->influence->bridge_kgpspa[c] = kept->influence.bridge_kgpspa[c];
         copy3(signals->influence->coupling[c], kept->influence.coupling[c]);
     }
 }
@@ -114,6 +116,7 @@ static void run_one(struct effect *effect, effect_hook hook, struct effect_signa
         keep(&kept, signals);
     }
     signals->chamber = effect->chamber;
+    signals->form = effect->form;
     hook(effect->state, effect->parameter, signals);
     for (size_t c = 0; c < 3 && effect->chamber > 0; c++) {
         if (c + 1 != effect->chamber) {
@@ -177,6 +180,14 @@ static bool set_parameter(struct effect *effect, const char *name, const char *t
     }
     if (strcmp(name, "onset") == 0) {
         return read_value(text, kind->name, name, 0.0, 1e6, "s", &effect->onset_s, error, bytes);
+    }
+    if (strcmp(name, "form") == 0 && kind->forms > 1) {
+        double form;
+        if (!read_value(text, kind->name, name, 0.0, (double)(kind->forms - 1), "1", &form, error, bytes)) {
+            return false;
+        }
+        effect->form = (size_t)lround(form);
+        return true;
     }
     for (size_t i = 0; i < kind->parameter_count; i++) {
         const struct effect_parameter *parameter = &kind->parameter[i];

@@ -16,6 +16,7 @@
 #include "sim/chamber.h"
 
 #define EFFECT_PARAMETERS_MAX 3
+#define EFFECT_FORMS_MAX 3
 #define EFFECT_STATE_DOUBLES 320
 
 /* Where the effect lies; the words of reports. */
@@ -45,6 +46,7 @@ struct effect_parameter {
 };
 
 struct effect_signals {
+    size_t form;          /* which of the kind's forms is meant (filled in by effects_run()) */
     double time_s;
     double step_s;
     double temperature_k; /* NAN: not known */
@@ -72,6 +74,9 @@ struct effect_kind {
     const char *signature; /* what it leaves in a recording, and what it may be taken for */
     enum effect_stage stage;
     enum effect_scope scope;
+    size_t forms;          /* the same cause may act in different ways: how many, 0 or 1 where there is one */
+    const char *form_what[EFFECT_FORMS_MAX];
+    bool forms_add;        /* a real case has all forms at once, each with parameters of its own */
     bool by_chance; /* parameter 0 is the probability that it acts at a tip sample (signals->chance below it) */
     size_t parameter_count;
     struct effect_parameter parameter[EFFECT_PARAMETERS_MAX];
@@ -87,6 +92,7 @@ struct effect_kind {
 struct effect {
     const struct effect_kind *kind;
     size_t chamber; /* 1 to 3: on that one only; 0: on all */
+    size_t form;    /* 0 to kind->forms - 1 */
     double onset_s; /* nothing happens before */
     double parameter[EFFECT_PARAMETERS_MAX];
     double state[EFFECT_STATE_DOUBLES];
@@ -107,7 +113,7 @@ const struct effect_kind *effect_kind_at(size_t index); /* sorted by name */
 const struct effect_kind *effect_kind_find(const char *name);
 const char *effect_stage_name(enum effect_stage stage);
 void effect_init(struct effect *effect, const struct effect_kind *kind);
-/* "NAME" or "NAME:parameter=value,parameter=value" in SI units; chamber=N and onset=SECONDS as well. False: `error` says
+/* "NAME" or "NAME:parameter=value,parameter=value" in SI units; chamber=N, form=N and onset=SECONDS as well. False: `error` says
  * what is wrong. */
 bool effect_parse(const char *text, struct effect *effect, char *error, size_t error_bytes);
 bool effect_has(const struct effect_kind *kind, enum effect_hook_kind hook);

@@ -94,7 +94,7 @@ static bool hal_read_pressures(void *context, struct hal_pressures *pressures) {
         pressures->chamber_ok[c] = !sim->faults.channel_fails[c];
     }
     pressures->supply_pa = (float)sim->plant.influence.supply_pa;
-    pressures->supply_ok = true;
+    pressures->supply_ok = !sim->faults.supply_unknown;
     return true;
 }
 

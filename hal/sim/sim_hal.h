@@ -23,6 +23,7 @@ struct sim_faults {
     bool channel_fails[3];          /* one channel cannot be read */
     bool reading_replaced[3];       /* a channel reads this instead */
     float reading_pa[3];
+    bool supply_unknown;            /* the supply is not measured */
     bool tip_stops;                 /* no more tip samples arrive */
     bool outputs_fail;              /* outputs cannot be written */
 };

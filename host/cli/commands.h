@@ -4,6 +4,7 @@
 
 #include <argp.h>
 
+#include "gap/calibration_use.h"
 #include "link/sim_drill.h"
 #include "link/sim_link.h"
 #include "program/program.h"
@@ -18,6 +19,8 @@ int cli_record(int argc, char **argv);
 int cli_import(int argc, char **argv);
 int cli_gap(int argc, char **argv);
 int cli_effects(int argc, char **argv);
+/* `tribend gap close` */
+int gap_close_run(int argc, char **argv);
 
 /* Options of every subcommand that talks to a controller. */
 struct bus_options {
@@ -30,6 +33,8 @@ struct bus_options {
     bool quiet;
     struct effect effect[PLANT_EFFECTS_MAX];
     size_t effect_count;
+    const char *calibration;            /* the simulated module is as this file says; NULL: nominal */
+    const char *controller_calibration; /* the controller is told of this one; NULL: of none */
     struct sim_drill drill;
 };
 
@@ -44,6 +49,9 @@ struct bus {
     struct table_file file;
     struct sim_link sim;
     struct link link;
+    struct calibrated_controller controller;
+    bool controller_calibrated;
+    unsigned char *controller_image; /* of the controller's table, for drills */
     const char *table_path;
     char found[PROGRAM_PATH_BYTES];
 };

@@ -8,6 +8,7 @@
 #include "cli/commands.h"
 #include "gap/diagnosis.h"
 #include "gap/report.h"
+#include "gap/report_html.h"
 
 #define WITHOUT_MAX 32
 
@@ -17,6 +18,7 @@ struct arguments {
     const char *table;
     const char *module;
     const char *json;
+    const char *html;
     const char *calibration_out;
     const char *without[WITHOUT_MAX];
     size_t without_count;
@@ -28,6 +30,7 @@ static const struct argp_option option_list[] = {
     {"table", 't', "FILE", 0, "bend table of the module (default $TRIBEND_TABLE, else the reference table)", 1},
     {"module", 'm', "NAME", 0, "refuse logs and tables of any other module", 1},
     {"json", 'j', "FILE", 0, "write the report as JSON", 1},
+    {"html", 'H', "FILE", 0, "write the report as a web page", 1},
     {"calibration-out", 'c', "FILE", 0, "write what was found as a calibration (YAML)", 1},
     {"without", 'w', "NAME", 0, "do not try this effect; may be repeated", 2},
     {"threads", 'T', "N", 0, "worker threads (default all cores)", 2},
@@ -55,6 +58,9 @@ static error_t parse(int key, char *argument, struct argp_state *state) {
         return 0;
     case 'j':
         arguments->json = argument;
+        return 0;
+    case 'H':
+        arguments->html = argument;
         return 0;
     case 'c':
         arguments->calibration_out = argument;
@@ -97,12 +103,15 @@ static void show_progress(void *context, const char *what, size_t done, size_t t
 }
 
 static int write_reports(const struct arguments *arguments, const struct diagnosis *diagnosis,
-                         const struct gap_data *data) {
+                         const struct search *search, const struct gap_data *data) {
     char error[PROGRAM_ERROR_BYTES];
     if (!arguments->quiet) {
         gap_report_text(diagnosis, data, stdout);
     }
     if (arguments->json != NULL && !gap_report_json(diagnosis, data, arguments->json, error, sizeof error)) {
+        return program_fail(EXIT_OUTPUT, "%s", error);
+    }
+    if (arguments->html != NULL && !gap_report_html(diagnosis, search, arguments->html, error, sizeof error)) {
         return program_fail(EXIT_OUTPUT, "%s", error);
     }
     if (arguments->calibration_out != NULL &&
@@ -128,7 +137,7 @@ static int diagnose(const struct arguments *arguments, const struct gap_data *da
         !diagnosis_conclude(diagnosis, search)) {
         code = program_interrupted ? EXIT_INTERRUPTED : program_fail(EXIT_SOLVER, "out of memory for the diagnosis");
     } else {
-        code = write_reports(arguments, diagnosis, data);
+        code = write_reports(arguments, diagnosis, search, data);
         code = code == EXIT_OK && search->interrupted ? EXIT_INTERRUPTED : code;
     }
     if (search != NULL) {
@@ -157,6 +166,9 @@ static int run_diagnose(int argc, char **argv) {
     }
     int code = table_file_open(&file, path, arguments.module);
     if (code == EXIT_OK) {
+        if (*data.module == '\0') {
+            (void)snprintf(data.module, sizeof data.module, "%s", file.table.module.name);
+        }
         if (strcmp(data.module, file.table.module.name) != 0 && *data.module != '\0') {
             code = program_fail(EXIT_BAD_INPUT, "%s is of module %s, but the table %s is of module %s: give that module's table with --table",
                                 arguments.logs[0], data.module, path, file.table.module.name);
@@ -171,6 +183,7 @@ static int run_diagnose(int argc, char **argv) {
 
 int cli_gap(int argc, char **argv) {
     static const struct program_subcommand subcommands[] = {
-        {"diagnose", run_diagnose, "where the gap lies, which effect causes it, how far it shrinks"}};
+        {"diagnose", run_diagnose, "where the gap lies, which effect causes it, how far it shrinks"},
+        {"close", gap_close_run, "how far a calibration closes the gap in closed loop"}};
     return program_run(argv[0], subcommands, sizeof subcommands / sizeof subcommands[0], argc, argv);
 }

@@ -18,6 +18,8 @@ static const struct argp_option option_list[] = {
     {"record", 'r', "FILE", 0, "write a run log (CSV)", 1},
     {"seed", 's', "N", 0, "of the simulation's noise (default 1)", 2},
     {"effect", 'e', "NAME[:P=V,..]", 0, "add a real-world effect to the plant; may be repeated", 2},
+    {"calibration", 'k', "FILE", 0, "the simulated module is as this calibration says (see docs/calibration.md)", 2},
+    {"controller-calibration", 'K', "FILE", 0, "the controller is told of this calibration", 2},
     {"drill", 'd', "FAULT@TIME", 0, "put a fault into the simulation, such as tip-lost@2s", 2},
     {"quiet", 'q', NULL, 0, "no progress lines", 1},
     {0}};
@@ -82,6 +84,12 @@ static error_t parse(int key, char *argument, struct argp_state *state) {
     case 'e':
         parse_effect(state, argument, options);
         return 0;
+    case 'k':
+        options->calibration = argument;
+        return 0;
+    case 'K':
+        options->controller_calibration = argument;
+        return 0;
     case 'd':
         if (!sim_drill_parse(argument, &options->drill, error, sizeof error)) {
             argp_error(state, "--drill: %s", error);
@@ -113,25 +121,84 @@ const char *bus_table_path(const char *table, char found[PROGRAM_PATH_BYTES]) {
     return path;
 }
 
-int bus_open(struct bus *bus, const struct bus_options *options) {
-    bus->table_path = bus_table_path(options->table, bus->found);
-    const int code = table_file_open(&bus->file, bus->table_path, options->module);
-    if (code != EXIT_OK) {
-        return code;
+/* The module as --calibration says. Returns an exit code. */
+static int calibrate_module(const struct bus *bus, const struct bus_options *options, struct calibration *calibration,
+                            struct sim_link_setup *setup) {
+    char error[PROGRAM_ERROR_BYTES];
+    if (options->calibration == NULL) {
+        return EXIT_OK;
     }
-    sim_link_open(&bus->sim, &bus->file.table, options->seed, &bus->link);
+    if (!calibration_read(options->calibration, bus->file.table.module.name, calibration, error, sizeof error)) {
+        return program_fail(EXIT_BAD_INPUT, "%s", error);
+    }
+    calibration_scale_plant(calibration, &setup->sim.plant);
+    return EXIT_OK;
+}
+
+/* The controller as --controller-calibration says. Returns an exit code. */
+static int calibrate_controller(struct bus *bus, const struct bus_options *options, struct sim_link_setup *setup) {
+    const char *path = options->controller_calibration;
+    char error[PROGRAM_ERROR_BYTES];
+    struct calibration calibration;
+    if (path == NULL) {
+        return EXIT_OK;
+    }
+    if (!calibration_read(path, bus->file.table.module.name, &calibration, error, sizeof error)) {
+        return program_fail(EXIT_BAD_INPUT, "%s", error);
+    }
+    if (!calibrated_controller_make(&bus->controller, &calibration, &bus->file.table, error, sizeof error)) {
+        return program_fail(EXIT_BAD_INPUT, "%s: %s", path, error);
+    }
+    bus->controller_calibrated = true;
+    bus->controller_image = bus->controller.table.image;
+    setup->controller_table = &bus->controller.table.table;
+    setup->controller = bus->controller.parameters;
+    for (size_t i = 0; i < bus->controller.notes; i++) {
+        printf("note      %s\n", bus->controller.note[i]);
+    }
+    return EXIT_OK;
+}
+
+static int add_effects(struct bus *bus, const struct bus_options *options, const struct calibration *calibration) {
+    struct sim *sim = &bus->sim.sim;
+    if (!calibration_add_effects(calibration, 0.0, sim)) {
+        return program_fail(EXIT_USAGE, "the simulation has no room for the %zu effects of %s", calibration->effects,
+                            options->calibration);
+    }
     for (size_t i = 0; i < options->effect_count; i++) {
-        if (!sim_add_effect(&bus->sim.sim, &options->effect[i])) {
-            bus_close(bus);
-            return program_fail(EXIT_USAGE, "the simulation has no room for effect '%s'",
-                                options->effect[i].kind->name);
+        if (!sim_add_effect(sim, &options->effect[i])) {
+            return program_fail(EXIT_USAGE, "the simulation has no room for effect '%s'", options->effect[i].kind->name);
         }
     }
     return EXIT_OK;
 }
 
+int bus_open(struct bus *bus, const struct bus_options *options) {
+    struct sim_link_setup setup;
+    struct calibration calibration = {.effects = 0};
+    memset(bus, 0, sizeof *bus);
+    bus->table_path = bus_table_path(options->table, bus->found);
+    int code = table_file_open(&bus->file, bus->table_path, options->module);
+    if (code != EXIT_OK) {
+        return code;
+    }
+    sim_link_default_setup(&setup, &bus->file.table, options->seed);
+    bus->controller_image = bus->file.bytes;
+    code = calibrate_module(bus, options, &calibration, &setup);
+    code = code == EXIT_OK ? calibrate_controller(bus, options, &setup) : code;
+    sim_link_open_setup(&bus->sim, &setup, &bus->link);
+    code = code == EXIT_OK ? add_effects(bus, options, &calibration) : code;
+    if (code != EXIT_OK) {
+        bus_close(bus);
+    }
+    return code;
+}
+
 void bus_close(struct bus *bus) {
     bus->link.close(bus->link.context);
+    if (bus->controller_calibrated) {
+        calibrated_controller_free(&bus->controller);
+    }
     table_file_close(&bus->file);
 }
 

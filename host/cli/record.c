@@ -49,7 +49,7 @@ static int follow(struct bus *bus, const struct bus_options *bus_options, struct
     const struct controller_command nothing = {.kind = COMMAND_NONE};
     int64_t end_us = 0;
     do {
-        sim_drill_apply(&bus_options->drill, &bus->sim, bus->file.bytes, bus->file.size);
+        sim_drill_apply(&bus_options->drill, &bus->sim, bus->controller_image, bus->file.size);
         if (!bus->link.receive(bus->link.context, report)) {
             return program_fail(EXIT_OUTPUT, "the controller on bus %s went away after %" PRIu64 " rows",
                                 bus_options->bus, *rows);

@@ -38,7 +38,7 @@ static bool send(struct run *run, enum controller_command_kind kind, int64_t tim
 /* One report, logged; false: the link is gone. */
 static bool receive(struct run *run, struct link_report *report) {
     struct bus *bus = run->bus;
-    sim_drill_apply(&run->options->drill, &bus->sim, bus->file.bytes, bus->file.size);
+    sim_drill_apply(&run->options->drill, &bus->sim, bus->controller_image, bus->file.size);
     if (!bus->link.receive(bus->link.context, report)) {
         return false;
     }

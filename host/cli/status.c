@@ -64,7 +64,7 @@ int cli_status(int argc, char **argv) {
     }
     memset(&report, 0, sizeof report);
     do {
-        sim_drill_apply(&options.drill, &bus.sim, bus.file.bytes, bus.file.size);
+        sim_drill_apply(&options.drill, &bus.sim, bus.controller_image, bus.file.size);
         if (!bus.link.receive(bus.link.context, &report)) {
             bus_close(&bus);
             return program_fail(EXIT_OUTPUT, "the controller on bus %s went away", options.bus);

@@ -9,14 +9,18 @@
 #define DEGREES (180.0 / M_PI)
 #define NINETY_PERCENT 1.645
 /* A gap whose structure is below this share of the noise floor's square is none. */
-#define STRUCTURE_NONE 0.10
+#define STRUCTURE_NONE 0.6
 /* Recalibration is the answer where it leaves no more than that, or this share of what was there. */
 #define RECALIBRATED_SHARE 0.05
 /* Catalogue effects must close this share of the structured gap, or the gap is of an unknown kind. */
-#define CLOSED_LEAST 0.70
+#define CLOSED_LEAST 0.87
+#define CLOSED_LEAST_BY_MANY 0.975 /* by several: together they can bend to much that they are not */
+/* What forms that only nearly fit do to a parameter, as a share of the effect's size: seen against effects of other forms. */
+#define FORM_SHARE 0.025
 /* A trial this much worse than the best, as a share of the gap, is e times less believed. */
 #define BELIEF_SHARE 0.02
 #define GROUP_LEAST 0.15 /* belief that puts a name into the group */
+#define SLUGGISH_SHARE 0.7
 #define SURE 0.60        /* belief above which one name is the verdict */
 #define CHUNK_S 2.5      /* of the bootstrap */
 #define RESAMPLES 400
@@ -81,17 +85,17 @@ static size_t list_series(const struct replay *replay, size_t index, size_t firs
     const struct replay_run *run = &replay->run[index];
     size_t count = 0;
     for (size_t c = 0; c < 3; c++) {
-        series[count++] = (struct series){run->pressure_at + c, 3, run->blocks, 0.02, first_chunk};
+        series[count++] = (struct series){run->pressure_at + c, 3, run->blocks, REPLAY_PRESSURE_BLOCK_S, first_chunk};
     }
-    series[count++] = (struct series){run->supply_at, 1, run->blocks, 0.02, first_chunk};
+    series[count++] = (struct series){run->supply_at, 1, run->blocks, REPLAY_PRESSURE_BLOCK_S, first_chunk};
     for (size_t k = 0; k < REPLAY_TIP_CHANNELS; k++) {
-        series[count++] = (struct series){run->tip_at + k, REPLAY_TIP_CHANNELS, run->tip_blocks, 0.05, first_chunk};
+        series[count++] = (struct series){run->tip_at + k, REPLAY_TIP_CHANNELS, run->tip_blocks, REPLAY_TIP_BLOCK_S, first_chunk};
     }
     return count;
 }
 
 static size_t chunks_of(const struct replay_run *run) {
-    return (size_t)(1e-3 * (double)run->steps / CHUNK_S) + 2;
+    return (size_t)(1e-6 * REPLAY_STEP_US * (double)run->steps / CHUNK_S) + 2;
 }
 
 /* Of neighbours both held out, half the squared difference is noise. */
@@ -294,9 +298,9 @@ static bool names_kind(const struct gap_model *model, const struct effect_kind *
     return false;
 }
 
-/* Belief in each kind at the place of effect `e` of the best model: the trials of its step, each kind by its best. */
+/* Belief in each kind on top of the `rest` of the best model: the trials of its step, each kind by its best. */
 static void weigh_kinds(const struct search *search, size_t step, double *belief, const struct effect_kind **kinds,
-                        size_t *count, const struct gap_model *rest) {
+                        size_t *count, const struct gap_model *rest, const struct effect_kind *own_kind) {
     double best = INFINITY, worst = 0.0;
     *count = 0;
     for (size_t t = 0; t < search->trials; t++) {
@@ -330,6 +334,19 @@ static void weigh_kinds(const struct search *search, size_t step, double *belief
         }
         best = fmin(best, cost);
         worst = fmax(worst, cost);
+    }
+    if (gap_model_kinds(&search->best.model) == step + 1) {
+        /* the best model itself: later steps may have found it */
+        size_t at = 0;
+        while (at < *count && kinds[at] != own_kind) {
+            at++;
+        }
+        if (at == *count && *count < SEARCH_CANDIDATES_MAX) {
+            kinds[(*count)++] = own_kind;
+            belief[at] = INFINITY;
+        }
+        belief[at] = fmin(belief[at], held_out(&search->best));
+        best = fmin(best, belief[at]);
     }
     const double before = step == 0 ? held_out(&search->recalibrated) : worst;
     const double noise = best / fmax(search->best.sums.pressure_count[1] + search->best.sums.tip_count[1], 1.0);
@@ -367,27 +384,51 @@ static double inflation(const struct search *search) {
     return fmax(mean2, 0.3) * 3.0;
 }
 
-static struct diagnosis_interval interval_of(const struct search *search, size_t index, double value) {
-    const double spread = NINETY_PERCENT * sqrt(fmax(search->everything.covariance[index][index], 0.0) * inflation(search));
+/* `form`: what the form of the effect may be off by; index SIZE_MAX: not fitted. */
+static struct diagnosis_interval interval_of(const struct search *search, size_t index, double value, double form) {
+    const double variance = index == SIZE_MAX ? 0.0 : fmax(search->everything.covariance[index][index], 0.0);
+    const double spread = NINETY_PERCENT * sqrt(variance * inflation(search) + form * form);
     return (struct diagnosis_interval){value, value - spread, value + spread};
 }
 
 static void take_effects(struct diagnosis *diagnosis, const struct search *search) {
     const struct gap_model *model = &search->everything.model;
     size_t index = 2;
-    diagnosis->stiffness_scale = interval_of(search, 0, model->stiffness_scale);
-    diagnosis->supply_scale = interval_of(search, 1, model->supply_scale);
-    diagnosis->effects = model->count;
+    diagnosis->stiffness_scale = interval_of(search, 0, model->stiffness_scale, 5e-4);
+    diagnosis->supply_scale = interval_of(search, 1, model->supply_scale, 5e-4);
     for (size_t e = 0; e < model->count; e++) {
         const struct effect *effect = &model->effect[e];
-        struct diagnosis_effect *out = &diagnosis->effect[e];
-        *out = (struct diagnosis_effect){.kind = effect->kind, .chamber = effect->chamber, .onset_s = effect->onset_s};
+        struct diagnosis_effect part, *out = gap_model_is_part(model, e) ? &part : &diagnosis->effect[diagnosis->effects++];
+        *out = (struct diagnosis_effect){.kind = effect->kind,
+                                         .form = effect->form,
+                                         .place = e,
+                                         .chamber = effect->chamber,
+                                         .onset_s = effect->onset_s};
         for (size_t i = 0; i < effect->kind->parameter_count; i++) {
             const bool fixed = effect->kind->by_chance && i == 0;
-            out->parameter[i] = fixed ? (struct diagnosis_interval){effect->parameter[i], effect->parameter[i] * 0.9,
-                                                                    effect->parameter[i] * 1.1}
-                                      : interval_of(search, index++, effect->parameter[i]);
+            const double none = effect->kind->parameter[i].none;
+            const double size = effect->parameter[i] - (isnan(none) ? 0.0 : none);
+            out->parameter[i] = interval_of(search, fixed ? SIZE_MAX : index++, effect->parameter[i], FORM_SHARE * size);
         }
+    }
+}
+
+/* The model without the effect at `place` and all that is part of it. */
+static void leave_out(const struct gap_model *model, size_t place, struct gap_model *rest) {
+    const struct effect_kind *kind = model->effect[place].kind;
+    const bool bends = strcmp(kind->name, "tip_distortion") == 0;
+    *rest = (struct gap_model){.stiffness_scale = model->stiffness_scale, .supply_scale = model->supply_scale};
+    for (size_t e = 0; e < model->count; e++) {
+        if (model->effect[e].kind != kind && !(bends && gap_model_is_part(model, e))) {
+            rest->effect[rest->count++] = model->effect[e];
+        }
+    }
+}
+
+static void add_name(struct diagnosis *diagnosis, const char *name, double probability) {
+    if (diagnosis->group < DIAGNOSIS_NAMES_MAX) {
+        diagnosis->group_name[diagnosis->group] = name;
+        diagnosis->group_probability[diagnosis->group++] = probability;
     }
 }
 
@@ -396,19 +437,25 @@ static void believe(struct diagnosis *diagnosis, const struct search *search) {
     const struct effect_kind *kinds[SEARCH_CANDIDATES_MAX];
     size_t count = 0;
     for (size_t e = 0; e < diagnosis->effects; e++) {
-        struct gap_model rest = search->best.model;
-        memmove(&rest.effect[e], &rest.effect[e + 1], (rest.count - e - 1) * sizeof rest.effect[0]);
-        rest.count--;
-        weigh_kinds(search, search->best.model.count - 1, belief, kinds, &count, &rest);
+        struct gap_model rest;
+        leave_out(&search->best.model, diagnosis->effect[e].place, &rest);
+        weigh_kinds(search, gap_model_kinds(&rest), belief, kinds, &count, &rest, diagnosis->effect[e].kind);
+        diagnosis->effect[e].probability = count == 0 || diagnosis->effect[e].kind->by_chance ? 0.95 : 0.0;
         for (size_t i = 0; i < count; i++) {
-            if (kinds[i] == diagnosis->effect[e].kind) {
+            if (kinds[i] == diagnosis->effect[e].kind && !kinds[i]->by_chance) {
                 diagnosis->effect[e].probability = belief[i];
             }
         }
         if (diagnosis->effects == 1 || diagnosis->effect[e].probability < SURE) {
             name_group(diagnosis, belief, kinds, count);
         }
+        /* on one chamber a narrow line does just what a sluggish valve does; the valve is the likelier */
+        if (strcmp(diagnosis->effect[e].kind->name, "valve_sluggish") == 0) {
+            diagnosis->effect[e].probability *= SLUGGISH_SHARE;
+            add_name(diagnosis, "line_resistance", 1.0 - SLUGGISH_SHARE);
+        }
     }
+    diagnosis->group = diagnosis->group > 1 ? diagnosis->group : 0;
 }
 
 /* --- where --- */
@@ -444,7 +491,8 @@ static void decide(struct diagnosis *diagnosis, const struct search *search) {
         }
         return;
     }
-    if (best > STRUCTURE_NONE && best > (1.0 - CLOSED_LEAST) * recalibrated) {
+    const double least = diagnosis->effects > 1 ? CLOSED_LEAST_BY_MANY : CLOSED_LEAST;
+    if (best > STRUCTURE_NONE && best > (1.0 - least) * recalibrated) {
         diagnosis->verdict = GAP_UNKNOWN;
         return;
     }

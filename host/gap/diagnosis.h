@@ -28,6 +28,8 @@ struct diagnosis_interval {
 
 struct diagnosis_effect {
     const struct effect_kind *kind;
+    size_t form;
+    size_t place;   /* in the search's best model */
     size_t chamber;
     double onset_s;
     double probability;

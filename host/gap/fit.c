@@ -192,6 +192,13 @@ static void sum_up(const struct fitter *fitter, const double *residual, struct f
                 const int out = replay->held_out[k];
                 *(k < run->tip_at ? &sums->pressure[out] : &sums->tip[out]) += residual[k] * residual[k];
                 *(k < run->tip_at ? &sums->pressure_count[out] : &sums->tip_count[out]) += 1.0;
+                const size_t stride = k < run->supply_at ? 3 : k < run->tip_at ? 1 : REPLAY_TIP_CHANNELS;
+                const size_t start = k < run->supply_at ? run->pressure_at : k < run->tip_at ? run->supply_at : run->tip_at;
+                if (k >= start + stride && replay->weight[k - stride] > 0.0 && replay->held_out[k - stride] == out) {
+                    const double step = residual[k] - residual[k - stride];
+                    sums->noise[out] += 0.5 * step * step;
+                    sums->noise_count[out] += 1.0;
+                }
             }
         }
     }
@@ -200,6 +207,11 @@ static void sum_up(const struct fitter *fitter, const double *residual, struct f
 double fit_mean_square(const struct fit_sums *sums, int held_out) {
     const double count = sums->pressure_count[held_out] + sums->tip_count[held_out];
     return count > 0.0 ? (sums->pressure[held_out] + sums->tip[held_out]) / count : 0.0;
+}
+
+double fit_structure(const struct fit_sums *sums, int held_out) {
+    const double noise = sums->noise_count[held_out] > 0.0 ? sums->noise[held_out] / sums->noise_count[held_out] : 0.0;
+    return fit_mean_square(sums, held_out) - noise;
 }
 
 static double cost_of(const struct fitter *fitter, const struct gap_model *model, const double *residual) {

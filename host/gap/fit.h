@@ -20,6 +20,8 @@ struct fit_sums {
     double tip[2];
     double pressure_count[2];
     double tip_count[2];
+    double noise[2]; /* half the squares of differences of neighbouring blocks, and how many */
+    double noise_count[2];
 };
 
 struct fit {
@@ -58,6 +60,8 @@ void fitter_run(struct fitter *fitter, struct fit *fit, int rounds, bool fit_nom
 void fitter_linear(struct fitter *fitter, const struct fit_base *base, const double *base_residual,
                    const struct effect *effect, double gain[4]);
 /* Mean square over pressure and tip, fitted or held out. */
+/* The same less what noise alone makes of it (von Neumann 1941): what is left to explain. */
+double fit_structure(const struct fit_sums *sums, int held_out);
 double fit_mean_square(const struct fit_sums *sums, int held_out);
 
 #endif

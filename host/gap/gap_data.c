@@ -9,7 +9,9 @@
 
 #define TIP_AGE_S 0.010      /* a pose is this old in the row in which it arrives (nominal sensor) */
 #define UNIT_TOLERANCE 0.05  /* of a quaternion's length */
-#define MOVED_M 3e-4         /* the tip has moved: an exact repeat then is no coincidence of the sensor's steps */
+#define MOVING_LEAST 20     /* samples that say anything */
+#define WINDOW 5             /* samples on either side .. */
+#define MOVED_M 3e-3         /* .. over which the tip moves so far that an exact repeat is no coincidence of the steps */
 
 static double cell(const struct run_log *log, size_t row, int column) {
     return column < 0 ? NAN : log->value[row * log->columns + (size_t)column];
@@ -72,27 +74,25 @@ static bool take_tip(struct gap_run *run, const struct run_log *log, size_t row,
     return true;
 }
 
-static void count_repeats(struct gap_run *run) {
-    size_t moving = 0, repeated = 0;
-    for (size_t i = 1; i < run->tips; i++) {
-        const struct gap_tip *before = &run->tip[i - 1];
-        struct gap_tip *tip = &run->tip[i];
-        tip->repeated = is_repeat(tip, before);
-        /* moving: the next sample that is no repeat lies elsewhere */
-        size_t next = i + 1;
-        while (next < run->tips && is_repeat(&run->tip[next], before)) {
-            next++;
-        }
-        if (next < run->tips) {
-            double moved = 0.0;
-            for (size_t k = 0; k < 3; k++) {
-                moved = hypot(moved, run->tip[next].position_m[k] - before->position_m[k]);
-            }
-            moving += moved > MOVED_M;
-            repeated += moved > MOVED_M && tip->repeated;
-        }
+/* Does the tip move about this sample? Seen over a window, so that repeats themselves do not decide. */
+static bool is_moving(const struct gap_run *run, size_t i) {
+    const struct gap_tip *before = &run->tip[i >= WINDOW ? i - WINDOW : 0];
+    const struct gap_tip *after = &run->tip[i + WINDOW < run->tips ? i + WINDOW : run->tips - 1];
+    double moved = 0.0;
+    for (size_t k = 0; k < 3; k++) {
+        moved = hypot(moved, after->position_m[k] - before->position_m[k]);
     }
-    run->repeated_share = moving > 20 ? (double)repeated / (double)moving : 0.0;
+    return moved > MOVED_M;
+}
+
+static void count_repeats(struct gap_run *run) {
+    for (size_t i = 1; i < run->tips; i++) {
+        struct gap_tip *tip = &run->tip[i];
+        tip->repeated = is_repeat(tip, &run->tip[i - 1]);
+        const bool moves = is_moving(run, i);
+        run->tips_moving += moves;
+        run->tips_repeated += moves && tip->repeated;
+    }
 }
 
 static bool out_of_memory(struct gap_run *run, char *error, size_t error_bytes) {
@@ -166,6 +166,15 @@ bool gap_data_read(struct gap_data *data, const char *const *paths, size_t count
         }
     }
     return true;
+}
+
+double gap_data_repeated_share(const struct gap_data *data) {
+    size_t moving = 0, repeated = 0;
+    for (size_t i = 0; i < data->runs; i++) {
+        moving += data->run[i].tips_moving;
+        repeated += data->run[i].tips_repeated;
+    }
+    return moving >= MOVING_LEAST ? (double)repeated / (double)moving : 0.0;
 }
 
 void gap_data_free(struct gap_data *data) {

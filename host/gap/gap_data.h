@@ -34,7 +34,8 @@ struct gap_run {
     size_t tips;
     struct gap_tip *tip;
     size_t tips_skipped;   /* with a status bit set, or a quaternion that is none */
-    double repeated_share; /* of the samples taken while the tip moved */
+    size_t tips_moving;    /* samples taken while the tip moved .. */
+    size_t tips_repeated;  /* .. and which of them repeat the one before */
 };
 
 struct gap_data {
@@ -46,6 +47,8 @@ struct gap_data {
 
 /* Reads the logs. False: `error` names file, line, column and remedy. */
 bool gap_data_read(struct gap_data *data, const char *const *paths, size_t count, char *error, size_t error_bytes);
+/* Share of repeated samples among those taken while the tip moved, over all runs. */
+double gap_data_repeated_share(const struct gap_data *data);
 void gap_data_free(struct gap_data *data);
 /* Seconds from the first row to the last, over all runs. */
 double gap_data_duration_s(const struct gap_data *data);

@@ -1,6 +1,7 @@
 #include "gap/gap_model.h"
 
 #include <math.h>
+#include <string.h>
 
 #define STIFFNESS_LEAST 0.4
 #define STIFFNESS_MOST 2.5
@@ -40,4 +41,34 @@ bool gap_effect_upstream(const struct effect_kind *kind) {
 bool gap_effect_downstream(const struct effect_kind *kind) {
     return effect_has(kind, EFFECT_HOOK_LOAD) || effect_has(kind, EFFECT_HOOK_SHAPE) ||
            effect_has(kind, EFFECT_HOOK_POSE);
+}
+
+static bool is_part_of_distortion(const char *name) {
+    static const char *const parts[] = {"tip_offset", "tip_lever_arm", "tip_misalignment"};
+    for (size_t i = 0; i < sizeof parts / sizeof parts[0]; i++) {
+        if (strcmp(name, parts[i]) == 0) {
+            return true;
+        }
+    }
+    return false;
+}
+
+bool gap_model_is_part(const struct gap_model *model, size_t e) {
+    const struct effect_kind *kind = model->effect[e].kind;
+    for (size_t f = 0; f < model->count; f++) {
+        const bool repeats = f < e && model->effect[f].kind == kind;
+        const bool bends = f != e && strcmp(model->effect[f].kind->name, "tip_distortion") == 0;
+        if (repeats || (bends && is_part_of_distortion(kind->name))) {
+            return true;
+        }
+    }
+    return false;
+}
+
+size_t gap_model_kinds(const struct gap_model *model) {
+    size_t kinds = 0;
+    for (size_t e = 0; e < model->count; e++) {
+        kinds += !gap_model_is_part(model, e);
+    }
+    return kinds;
 }

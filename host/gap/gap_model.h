@@ -4,7 +4,7 @@
 
 #include "sim/plant.h"
 
-#define GAP_EFFECTS_MAX 4
+#define GAP_EFFECTS_MAX 6
 #define GAP_PARAMETERS_MAX (2 + GAP_EFFECTS_MAX * EFFECT_PARAMETERS_MAX)
 
 struct gap_model {
@@ -27,6 +27,11 @@ struct gap_parameter {
 
 /* Fills `parameter`; returns how many. Parameters that data cannot move (probabilities) are left out. */
 size_t gap_model_parameters(struct gap_model *model, struct gap_parameter parameter[GAP_PARAMETERS_MAX]);
+/* Is effect `e` part of a kind that is named elsewhere in the model? Forms of one kind are one effect; and a bent field
+ * displaces the rest pose and tilts it too, so offset, lever arm and misalignment beside a distortion are part of that. */
+bool gap_model_is_part(const struct gap_model *model, size_t e);
+/* Kinds that the model names, parts not counted. */
+size_t gap_model_kinds(const struct gap_model *model);
 /* Does the effect act before the pressure readings (supply, valves, pressure sensors)? */
 bool gap_effect_upstream(const struct effect_kind *kind);
 bool gap_effect_downstream(const struct effect_kind *kind);

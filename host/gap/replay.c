@@ -4,9 +4,9 @@
 #include <stdlib.h>
 #include <string.h>
 
-#define STEP_US 1000
-#define PRESSURE_BLOCK_STEPS 20 /* 20 ms: two PWM periods */
-#define TIP_BLOCK_S 0.05
+#define STEP_US REPLAY_STEP_US
+#define PRESSURE_BLOCK_STEPS ((size_t)(REPLAY_PRESSURE_BLOCK_S * 1e6 + 0.5) / STEP_US)
+#define TIP_BLOCK_S REPLAY_TIP_BLOCK_S
 #define HELD_OUT_S 2.5          /* lengths of the blocks that are kept from the fit, every other one */
 #define SUPPLY_SPREAD_PA 60.0   /* of a block: how well a supply reading says what the valves feel */
 /* What a sensor's steps and the table's interpolation leave in a mean, however many samples it has. */
@@ -80,7 +80,7 @@ static void find_start(struct replay_run *run) {
 
 static void mark_held_out(struct replay *replay, size_t index) {
     const struct replay_run *run = &replay->run[index];
-    const double block_s = 1e-6 * STEP_US * PRESSURE_BLOCK_STEPS;
+    const double block_s = REPLAY_PRESSURE_BLOCK_S;
     for (size_t b = 0; b < run->blocks; b++) {
         const uint8_t out = held_out_at(replay, index, (double)b * block_s);
         for (size_t c = 0; c < 3; c++) {
@@ -356,7 +356,7 @@ static double between(const double *value, size_t stride, size_t count, double p
 
 /* Block of the level at a time in steps: levels stand for their block's middle. */
 static double block_position(double step) {
-    return (step - 0.5 * PRESSURE_BLOCK_STEPS) / PRESSURE_BLOCK_STEPS;
+    return step / (double)PRESSURE_BLOCK_STEPS - 0.5;
 }
 
 /* Sensors beside pressures that are known at the end of each step: sums of differences into the walk. */
@@ -591,7 +591,8 @@ static bool fit_smoothers(struct replay *replay, struct replay_state *state) {
                 room[b] = state->difference[i][3 * b + c];
                 room[run->blocks + b] = run->variance[3 * b + c];
             }
-            if (!smoother_fit(&run->smoother[c], room, room + run->blocks, run->blocks, from_readings)) {
+            const bool rigid = replay->rigid && run->run->has_duty;
+            if (!smoother_fit(&run->smoother[c], room, room + run->blocks, run->blocks, rigid, from_readings)) {
                 free(room);
                 return false;
             }

@@ -17,11 +17,14 @@
 #include "gap/smoother.h"
 
 #define REPLAY_TIP_CHANNELS 6
+#define REPLAY_STEP_US 2000           /* of the gas; valves switch in between, where they do */
+#define REPLAY_PRESSURE_BLOCK_S 0.02  /* two PWM periods */
+#define REPLAY_TIP_BLOCK_S 0.05
 
 struct replay_run {
     const struct gap_run *run;
     int64_t start_us;
-    size_t steps;           /* of a millisecond */
+    size_t steps;           /* of REPLAY_STEP_US */
     size_t blocks;          /* of pressure */
     size_t tip_blocks;
     size_t pressure_at;     /* where its residuals start in the vector */
@@ -44,6 +47,7 @@ struct replay {
     size_t runs;
     struct replay_run run[GAP_RUNS_MAX];
     size_t residuals;
+    bool rigid;        /* pressures are as the duties make them, but for a constant: the tip then tells of them finest */
     double *weight;    /* [residuals] 1 / (noise of a block) */
     uint8_t *held_out; /* [residuals] 1: not used to fit */
 };

@@ -137,8 +137,8 @@ static json_t *effect_json(const struct diagnosis_effect *effect) {
         json_object_set_new(parameters, effect->kind->parameter[i].name,
                             interval_json(&effect->parameter[i], effect->kind->parameter[i].unit));
     }
-    return json_pack("{s:s,s:s,s:i,s:f,s:f,s:o}", "name", effect->kind->name, "stage",
-                     effect_stage_name(effect->kind->stage), "chamber", (int)effect->chamber, "onset_s",
+    return json_pack("{s:s,s:s,s:i,s:i,s:f,s:f,s:o}", "name", effect->kind->name, "stage",
+                     effect_stage_name(effect->kind->stage), "form", (int)effect->form, "chamber", (int)effect->chamber, "onset_s",
                      effect->onset_s, "probability", effect->probability, "parameters", parameters);
 }
 
@@ -174,7 +174,7 @@ static json_t *report_json(const struct diagnosis *diagnosis, const struct gap_d
             json_array_append_new(chambers, json_integer((json_int_t)c + 1));
         }
     }
-    for (size_t i = 0; i < diagnosis->group && diagnosis->verdict == GAP_GROUP; i++) {
+    for (size_t i = 0; i < diagnosis->group && diagnosis->verdict != GAP_UNKNOWN; i++) {
         json_array_append_new(group, json_string(diagnosis->group_name[i]));
     }
     for (size_t i = 0; i < diagnosis->warnings; i++) {
@@ -185,10 +185,11 @@ static json_t *report_json(const struct diagnosis *diagnosis, const struct gap_d
     }
     json_t *closed = interval_json(&diagnosis->closed, NULL);
     json_object_set_new(closed, "recalibration", json_real(diagnosis->closed_recalibration.value));
-    return json_pack("{s:s,s:o,s:s,s:{s:s,s:o,s:s},s:o,s:o,s:{s:o,s:o},s:o,s:o,s:s,s:s,s:o}", "verdict",
+    return json_pack("{s:s,s:o,s:s,s:{s:s,s:o,s:s},s:o,s:o,s:o,s:{s:o,s:o},s:o,s:o,s:s,s:s,s:o}", "verdict",
                      gap_verdict_name(diagnosis->verdict), "logs", logs, "module", data->module, "locus", "stage",
                      diagnosis->stage, "chambers", chambers, "regime", diagnosis->regime, "effects",
-                     effects_json(diagnosis), "group", group, "nominal", "stiffness_scale",
+                     effects_json(diagnosis), "group", group, "structure",
+                     json_pack("[f,f,f]", diagnosis->structure[0], diagnosis->structure[1], diagnosis->structure[2]), "nominal", "stiffness_scale",
                      interval_json(&diagnosis->stiffness_scale, "1"), "supply_scale",
                      interval_json(&diagnosis->supply_scale, "1"), "gap", gaps_json(diagnosis), "closed_fraction",
                      closed, "description", diagnosis->description, "next_experiment", diagnosis->next_experiment,
@@ -244,8 +245,8 @@ bool gap_report_calibration(const struct diagnosis *diagnosis, const struct gap_
     fprintf(out, "effects:%s\n", named && diagnosis->effects > 0 ? "" : " []");
     for (size_t e = 0; e < diagnosis->effects && named; e++) {
         const struct diagnosis_effect *effect = &diagnosis->effect[e];
-        fprintf(out, "  - name: %s\n    chamber: %zu\n    onset_s: %.6g\n    parameters:\n", effect->kind->name,
-                effect->chamber, effect->onset_s);
+        fprintf(out, "  - name: %s\n    form: %zu\n    chamber: %zu\n    onset_s: %.6g\n    parameters:\n", effect->kind->name,
+                effect->form, effect->chamber, effect->onset_s);
         for (size_t i = 0; i < effect->kind->parameter_count; i++) {
             const struct diagnosis_interval *value = &effect->parameter[i];
             fprintf(out, "      - { name: %s, value: %.8g, low: %.8g, high: %.8g, unit: \"%s\" }\n",

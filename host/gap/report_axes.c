@@ -3,8 +3,10 @@
 #include <math.h>
 #include <string.h>
 
-#define AIR 0.06 /* of a range, at either end */
+#define AIR 0.06  /* of a range, at either end */
+#define EDGE 10.0 /* px */
 #define LABEL_BYTES 48
+#define ROUNDING 1e-9 /* of a step: a tick at the very end of an axis is drawn */
 
 static double kept_within(double value, double low, double high) {
     return fmin(fmax(value, low), high);
@@ -28,8 +30,8 @@ void axes_widen(double *low, double *high, double least) {
 }
 
 void axes_frame(FILE *out, const struct axes *axes) {
-    fprintf(out, "<rect class=\"frame\" x=\"%.1f\" y=\"%.1f\" width=\"%.1f\" height=\"%.1f\"/>\n", axes->left, axes->top,
-            axes->width, axes->height);
+    fprintf(out, "<rect class=\"frame\" x=\"%.1f\" y=\"%.1f\" width=\"%.1f\" height=\"%.1f\"/>\n", axes->left,
+            axes->top, axes->width, axes->height);
 }
 
 /* 1, 2 or 5 times a power of ten (Heckbert 1990). */
@@ -40,9 +42,18 @@ static double nice_step(double span, size_t about) {
     return power * (lead < 1.5 ? 1.0 : lead < 3.5 ? 2.0 : lead < 7.5 ? 5.0 : 10.0);
 }
 
+/* In steps from zero. */
+static long first_tick(double low, double step) {
+    return lround(ceil(low / step - ROUNDING));
+}
+
+static long last_tick(double high, double step) {
+    return lround(floor(high / step + ROUNDING));
+}
+
 static void write_label(FILE *out, double value, double step) {
     char text[LABEL_BYTES];
-    const int decimals = (int)kept_within(ceil(-log10(step) - 1e-9), 0.0, 9.0);
+    const int decimals = (int)kept_within(ceil(-log10(step) - ROUNDING), 0.0, 9.0);
     (void)snprintf(text, sizeof text, "%.*f", decimals, fabs(value));
     const bool is_zero = strspn(text, "0.") == strlen(text);
     fprintf(out, "%s%s", value < 0.0 && !is_zero ? "\xe2\x88\x92" : "", text);
@@ -50,11 +61,17 @@ static void write_label(FILE *out, double value, double step) {
 
 void axes_ticks_x(FILE *out, const struct axes *axes, size_t about, bool labelled) {
     const double step = axes->x_step > 0.0 ? axes->x_step : nice_step(axes->x_high - axes->x_low, about);
-    for (double x = step * ceil(axes->x_low / step - 1e-9); x <= axes->x_high + 1e-9 * step; x += step) {
-        const double at = axes_x(axes, x);
+    for (long i = first_tick(axes->x_low, step); i <= last_tick(axes->x_high, step); i++) {
+        const double x = step * (double)i, at = axes_x(axes, x);
         fprintf(out, "<path class=\"grid\" d=\"M%.1f %.1fv%.1f\"/>", at, axes->top, axes->height);
         if (labelled) {
-            fprintf(out, "<text class=\"tick middle\" x=\"%.1f\" y=\"%.1f\">", at, axes->top + axes->height + 15.0);
+            /* a label at the very edge stays over its own picture */
+            const bool left = at<axes->left + EDGE, right = at> axes->left + axes->width - EDGE;
+            fprintf(out, "<text class=\"tick%s\" x=\"%.1f\" y=\"%.1f\">",
+                    left    ? ""
+                    : right ? " end"
+                            : " middle",
+                    at, axes->top + axes->height + 15.0);
             write_label(out, x, step);
             fputs("</text>\n", out);
         }
@@ -63,10 +80,11 @@ void axes_ticks_x(FILE *out, const struct axes *axes, size_t about, bool labelle
 
 void axes_ticks_y(FILE *out, const struct axes *axes, size_t about, bool labelled) {
     const double step = axes->y_step > 0.0 ? axes->y_step : nice_step(axes->y_high - axes->y_low, about);
-    for (double y = step * ceil(axes->y_low / step - 1e-9); y <= axes->y_high + 1e-9 * step; y += step) {
-        const double at = axes_y(axes, y);
-        const bool zero = fabs(y) < 1e-9 * step;
-        fprintf(out, "<path class=\"%s\" d=\"M%.1f %.1fh%.1f\"/>", zero ? "zero" : "grid", axes->left, at, axes->width);
+    for (long i = first_tick(axes->y_low, step); i <= last_tick(axes->y_high, step); i++) {
+        const double y = step * (double)i, at = axes_y(axes, y);
+        const bool zero = i == 0;
+        fprintf(out, "<path class=\"%s\" d=\"M%.1f %.1fh%.1f\"/>", zero ? "zero" : "grid", axes->left, at,
+                axes->width);
         if (labelled) {
             fprintf(out, "<text class=\"tick end\" x=\"%.1f\" y=\"%.1f\">", axes->left - 6.0, at + 4.0);
             write_label(out, y, step);
@@ -109,8 +127,8 @@ static void draw_extremes(struct pen *pen, const struct axes_points *points, siz
     }
 }
 
-void axes_line(FILE *out, const struct axes *axes, const char *class, const struct axes_points *points, size_t most,
-               double gap) {
+void axes_line(FILE *out, const struct axes *axes, const char *class, const struct axes_points *points,
+               size_t most, double gap) {
     struct pen pen = {out, axes, gap, NAN, NAN};
     const size_t each = points->count <= most ? 1 : (2 * points->count + most - 1) / most;
     fprintf(out, "<path class=\"%s\" d=\"", class);
@@ -120,7 +138,8 @@ void axes_line(FILE *out, const struct axes *axes, const char *class, const stru
     fputs("\"/>\n", out);
 }
 
-void axes_band(FILE *out, const struct axes *axes, const char *class, const struct axes_points *low, const double *high) {
+void axes_band(FILE *out, const struct axes *axes, const char *class, const struct axes_points *low,
+               const double *high) {
     if (low->count < 2) {
         return;
     }
@@ -130,7 +149,8 @@ void axes_band(FILE *out, const struct axes *axes, const char *class, const stru
         fprintf(out, "%c%.1f %.1f", i == 0 ? 'M' : 'L', axes_x(axes, x), axes_y(axes, y));
     }
     for (size_t i = low->count; i-- > 0;) {
-        fprintf(out, "L%.1f %.1f", axes_x(axes, low->x[i * low->stride]), axes_y(axes, high[i * low->stride]));
+        fprintf(out, "L%.1f %.1f", axes_x(axes, low->x[i * low->stride]),
+                axes_y(axes, high[i * low->stride]));
     }
     fputs("Z\"/>\n", out);
 }

@@ -1,4 +1,5 @@
-/* A plotting area of an SVG picture: scales, ticks, lines and bands. Pixels, y downward; colours are the page's classes. */
+/* A plotting area of an SVG picture: scales, ticks, lines and bands. Pixels, y downward; colours are the
+ * page's classes. */
 #ifndef TRIBEND_GAP_REPORT_AXES_H
 #define TRIBEND_GAP_REPORT_AXES_H
 
@@ -17,7 +18,7 @@ struct axes {
     double y_high;
     double x_step; /* between ticks; 0: as it suits */
     double y_step;
-    double turn;   /* 360 where y is an angle in degrees: no line joins +180 and -180; else 0 */
+    double turn; /* 360 where y is an angle in degrees: no line joins +180 and -180; else 0 */
 };
 
 /* Points of a line or band: values that lie `stride` apart in memory. */
@@ -37,9 +38,10 @@ void axes_frame(FILE *out, const struct axes *axes);
 void axes_ticks_x(FILE *out, const struct axes *axes, size_t about, bool labelled);
 void axes_ticks_y(FILE *out, const struct axes *axes, size_t about, bool labelled);
 /* A line of at most `most` points that keeps extremes; it is broken where nothing was seen for `gap` in x. */
-void axes_line(FILE *out, const struct axes *axes, const char *class, const struct axes_points *points, size_t most,
-               double gap);
+void axes_line(FILE *out, const struct axes *axes, const char *class, const struct axes_points *points,
+               size_t most, double gap);
 /* The area between two lines over the same x. */
-void axes_band(FILE *out, const struct axes *axes, const char *class, const struct axes_points *low, const double *high);
+void axes_band(FILE *out, const struct axes *axes, const char *class, const struct axes_points *low,
+               const double *high);
 
 #endif

@@ -52,13 +52,15 @@ static double squares(struct room *room, const struct gap_model *model) {
 }
 
 static int by_closed(const void *a, const void *b) {
-    const double x = ((const struct report_candidate *)a)->closed, y = ((const struct report_candidate *)b)->closed;
+    const double x = ((const struct report_candidate *)a)->closed,
+                 y = ((const struct report_candidate *)b)->closed;
     return (x < y) - (x > y);
 }
 
-/* The best model closes diagnosis->closed of the gap by taking off a sum of squares; others take off more or less. */
-static void weigh(struct report_candidates *candidates, const struct diagnosis *diagnosis, const struct search *search,
-                  struct room *room) {
+/* The best model closes diagnosis->closed of the gap by taking off a sum of squares; others take off more or
+ * less. */
+static void weigh(struct report_candidates *candidates, const struct diagnosis *diagnosis,
+                  const struct search *search, struct room *room) {
     const struct fit *picked[SEARCH_CANDIDATES_MAX];
     const size_t count = pick_trials(search, picked);
     const double before = squares(room, &search->nominal.model);
@@ -121,7 +123,7 @@ static struct recorded what_is_recorded(const struct gap_data *data) {
     for (size_t i = 0; i < data->runs; i++) {
         has.duties = has.duties && data->run[i].has_duty;
         has.readings = has.readings && data->run[i].has_reading;
-        has.repeats = has.repeats || data->run[i].repeated_share > 0.02;
+        has.repeats = gap_data_repeated_share(data) > 0.02;
     }
     return has;
 }
@@ -141,11 +143,11 @@ const char *report_why_untried(const struct search *search, const struct effect_
         return has.tips ? NULL : "no tip samples in the logs";
     }
     if (kind->stage == EFFECT_STAGE_PRESSURE_SENSOR) {
-        return !has.readings ? "no measured pressures in the logs"
+        return !has.readings            ? "no measured pressures in the logs"
                : has.duties || has.tips ? NULL
                                         : "neither duties nor tip samples to hold the readings against";
     }
-    return !has.duties ? "no duties in the logs"
+    return !has.duties                ? "no duties in the logs"
            : has.readings || has.tips ? NULL
                                       : "neither measured pressures nor tip samples in the logs";
 }

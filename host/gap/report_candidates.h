@@ -1,5 +1,5 @@
-/* What the search tried, as the HTML report shows it: each kind of effect by its best trial on its own, and the kinds that
- * were not tried, with the reason. */
+/* What the search tried, as the HTML report shows it: each kind of effect by its best trial on its own, and
+ * the kinds that were not tried, with the reason. */
 #ifndef TRIBEND_GAP_REPORT_CANDIDATES_H
 #define TRIBEND_GAP_REPORT_CANDIDATES_H
 

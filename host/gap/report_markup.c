@@ -7,12 +7,17 @@
 #define DASH "\xe2\x80\x93"
 #define REPLACEMENT "\xef\xbf\xbd"
 #define DECIMALS_MOST 6
+#define DIGITS_SHARE 5e-3 /* of a value, that is worth a decimal */
 #define MILLISECONDS_BELOW_S 0.5
 
 /* Bytes of the well-formed UTF-8 character at `text`; 0: there is none. */
 static size_t character_bytes(const unsigned char *text) {
     static const unsigned least[5] = {0, 0, 0x80, 0x800, 0x10000};
-    const size_t bytes = *text < 0x80 ? 1 : *text >> 5 == 6 ? 2 : *text >> 4 == 14 ? 3 : *text >> 3 == 30 ? 4 : 0;
+    const size_t bytes = *text < 0x80       ? 1
+                         : *text >> 5 == 6  ? 2
+                         : *text >> 4 == 14 ? 3
+                         : *text >> 3 == 30 ? 4
+                                            : 0;
     unsigned code = bytes < 2 ? *text : *text & (0xffu >> (bytes + 1));
     for (size_t i = 1; i < bytes; i++) {
         if (text[i] >> 6 != 2) {
@@ -20,7 +25,8 @@ static size_t character_bytes(const unsigned char *text) {
         }
         code = code << 6 | (text[i] & 0x3fu);
     }
-    const bool wrong = bytes == 0 || code < least[bytes] || code > 0x10ffff || (code >= 0xd800 && code < 0xe000);
+    const bool wrong =
+        bytes == 0 || code < least[bytes] || code > 0x10ffff || (code >= 0xd800 && code < 0xe000);
     const bool control = code < 0x20 || (code >= 0x7f && code < 0xa0) || (code & 0xfffe) == 0xfffe;
     return wrong || (control && code != '\n' && code != '\t') ? 0 : bytes;
 }
@@ -67,7 +73,7 @@ void markup_number(FILE *out, double value, double resolution) {
         fputs(DASH, out);
         return;
     }
-    const double fine = resolution > 0.0 ? 0.2 * resolution : 2e-3 * fabs(value);
+    const double fine = resolution > 0.0 ? resolution : DIGITS_SHARE * fabs(value);
     const double wanted = fine > 0.0 ? ceil(-log10(fine)) : 0.0;
     const int decimals = (int)fmin(fmax(wanted, 0.0), DECIMALS_MOST);
     char text[64];
@@ -77,7 +83,7 @@ void markup_number(FILE *out, double value, double resolution) {
 }
 
 void markup_percent(FILE *out, double share) {
-    markup_number(out, 100.0 * share, 5.0);
+    markup_number(out, 100.0 * share, 1.0);
     fputs("\xc2\xa0%", out);
 }
 
@@ -126,5 +132,19 @@ void markup_interval(FILE *out, const struct diagnosis_interval *interval, const
 void markup_quantity(FILE *out, double value, const char *si_unit) {
     const struct markup_unit unit = markup_unit(si_unit, value);
     markup_number(out, unit.factor * value, 0.0);
-    put_unit(out, &unit);
+    if (isfinite(value)) {
+        put_unit(out, &unit);
+    }
+}
+
+void markup_parameters(FILE *out, const struct effect *effect) {
+    if (effect->chamber > 0) {
+        fprintf(out, "chamber %zu, ", effect->chamber);
+    }
+    for (size_t i = 0; i < effect->kind->parameter_count; i++) {
+        fputs(i > 0 ? ", " : "", out);
+        markup_words(out, effect->kind->parameter[i].name);
+        fputs(" ", out);
+        markup_quantity(out, effect->parameter[i], effect->kind->parameter[i].unit);
+    }
 }

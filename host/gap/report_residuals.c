@@ -8,18 +8,19 @@
 #include "gap/report_markup.h"
 
 #define BINS 20
-#define BIN_LEAST 8          /* values below which a bin is not drawn */
-#define TAIL 0.01            /* of a variable's values, left out at either end of its axis */
-#define FIGURE_WIDTH 1080.0
-#define LABEL_WIDTH 148.0
+#define BIN_LEAST 8 /* values below which a bin is not drawn */
+#define TAIL 0.01   /* of a variable's values, left out at either end of its axis */
+#define FIGURE_WIDTH 1064.0
+#define LABEL_WIDTH 146.0
 #define CELL_WIDTH 122.0
-#define CELL_PITCH 133.0
+#define CELL_PITCH 132.0
 #define CELL_HEIGHT 78.0
 #define ROW_PITCH 104.0
-#define HEAD_ROOM 44.0
+#define HEAD_ROOM 58.0
 #define FOOT_ROOM 30.0
 #define VARIABLES_MAX 7
-#define STRIKING 0.2         /* share explained that is worth a look */
+#define CHAMBERS_APART_DEG 120.0
+#define STRIKING 0.2 /* share explained that is worth a look */
 
 struct variable {
     const char *name;
@@ -43,11 +44,12 @@ struct matrix {
     struct residual residual[REPORT_RESIDUALS];
 };
 
-static const struct matrix pressures = {.tip = false,
-                                        .residuals = 3,
-                                        .residual = {{"chamber 1", "pressure", "kPa", 0, REPORT_RATE_1, 0.04},
-                                                     {"chamber 2", "pressure", "kPa", 1, REPORT_RATE_2, 0.04},
-                                                     {"chamber 3", "pressure", "kPa", 2, REPORT_RATE_3, 0.04}}};
+static const struct matrix pressures = {
+    .tip = false,
+    .residuals = 3,
+    .residual = {{"chamber 1", "pressure", "kPa", 0, REPORT_RATE_1, 0.04},
+                 {"chamber 2", "pressure", "kPa", 1, REPORT_RATE_2, 0.04},
+                 {"chamber 3", "pressure", "kPa", 2, REPORT_RATE_3, 0.04}}};
 static const struct matrix tips = {
     .tip = true,
     .residuals = 6,
@@ -105,14 +107,15 @@ static void sample_close(struct sample *sample) {
     free(sample->room);
 }
 
-static void collect(struct sample *sample, const struct report_series *series, bool tip, size_t column, size_t offset) {
+static void collect(struct sample *sample, const struct report_series *series, bool tip, size_t column,
+                    size_t offset) {
     sample->count = 0;
     for (size_t i = 0; i < series->runs; i++) {
         const struct report_table *table = table_of(series, i, tip);
         for (size_t row = 0; row < table->rows; row++) {
             const double *cell = table->cell + row * REPORT_COLUMNS;
-            const struct triple value = {cell[column],
-                                         {cell[REPORT_RESIDUAL_BEFORE + offset], cell[REPORT_RESIDUAL_AFTER + offset]}};
+            const struct triple value = {
+                cell[column], {cell[REPORT_RESIDUAL_BEFORE + offset], cell[REPORT_RESIDUAL_AFTER + offset]}};
             if (!isnan(value.x + value.off[0] + value.off[1])) {
                 sample->value[sample->count++] = value;
             }
@@ -163,8 +166,10 @@ static void fill_curve(struct sample *sample, const double span[2], size_t which
     }
 }
 
-/* Sum of squares about the mean, and the part of it that lies between the bins' means, less what chance puts there. */
-static void split_squares(const struct sample *sample, const double span[2], size_t which, double *all, double *between) {
+/* Sum of squares about the mean, and the part of it that lies between the bins' means, less what chance puts
+ * there. */
+static void split_squares(const struct sample *sample, const double span[2], size_t which, double *all,
+                          double *between) {
     double sum[BINS + 1] = {0.0}, count[BINS + 1] = {0.0}, total = 0.0;
     for (size_t i = 0; i < sample->count; i++) {
         const size_t bin = bin_of(sample->value[i].x, span);
@@ -206,13 +211,14 @@ static double cell_left(size_t v) {
 static size_t list_variables(const struct report_series *series, const struct gap_data *data, bool tip,
                              struct variable variable[VARIABLES_MAX]) {
     const bool angle = data->run[0].has_orientation;
-    const struct variable all[VARIABLES_MAX] = {{"time", "s", REPORT_TIME},
-                                                {"chamber 1", "kPa", REPORT_PRESSURE_1},
-                                                {"chamber 2", "kPa", REPORT_PRESSURE_2},
-                                                {"chamber 3", "kPa", REPORT_PRESSURE_3},
-                                                {tip ? "mean pressure rate" : "own pressure rate", "kPa/s", REPORT_RATE_MEAN},
-                                                {angle ? "tip bend" : "tip off axis", angle ? "deg" : "mm", REPORT_BEND},
-                                                {"tip direction", "deg", REPORT_DIRECTION}};
+    const struct variable all[VARIABLES_MAX] = {
+        {"time", "s", REPORT_TIME},
+        {"chamber 1", "pressure, kPa", REPORT_PRESSURE_1},
+        {"chamber 2", "pressure, kPa", REPORT_PRESSURE_2},
+        {"chamber 3", "pressure, kPa", REPORT_PRESSURE_3},
+        {"pressure rate", tip ? "kPa/s, mean of three" : "kPa/s, own chamber", REPORT_RATE_MEAN},
+        {angle ? "tip bend" : "tip off axis", angle ? "deg" : "mm", REPORT_BEND},
+        {"tip direction", "deg", REPORT_DIRECTION}};
     size_t count = 0;
     for (size_t v = 0; v < VARIABLES_MAX; v++) {
         bool any = false;
@@ -237,7 +243,8 @@ static void span_of(struct sample *sample, const struct report_series *series, c
     span[1] = -INFINITY;
     for (size_t r = 0; r < matrix->residuals; r++) {
         double mine[2];
-        collect(sample, series, matrix->tip, column_for(variable, &matrix->residual[r]), matrix->residual[r].offset);
+        collect(sample, series, matrix->tip, column_for(variable, &matrix->residual[r]),
+                matrix->residual[r].offset);
         if (sample->count >= BIN_LEAST) {
             find_span(sample, mine);
             span[0] = fmin(span[0], mine[0]);
@@ -257,19 +264,21 @@ static void include_curve(const struct curve *curve, double range[2]) {
     }
 }
 
-static void draw_curve(FILE *out, const struct axes *axes, const struct curve *curve, const char *band, const char *line) {
+static void draw_curve(FILE *out, const struct axes *axes, const struct curve *curve, const char *band,
+                       const char *line) {
     const struct axes_points low = {curve->x, curve->low, 1, curve->count};
     const struct axes_points middle = {curve->x, curve->middle, 1, curve->count};
     axes_band(out, axes, band, &low, curve->high);
     axes_line(out, axes, line, &middle, BINS, INFINITY);
 }
 
-static void draw_cell(FILE *out, const struct axes *axes, const struct cell *cell, const struct variable *variable,
-                      bool first, bool last) {
-    fprintf(out, "<g><rect class=\"tint\" fill-opacity=\"%.2f\" x=\"%.1f\" y=\"%.1f\" width=\"%.1f\" height=\"%.1f\"/>\n",
+static void draw_cell(FILE *out, const struct axes *axes, const struct cell *cell, bool first, bool last) {
+    fprintf(out,
+            "<g><rect class=\"tint\" fill-opacity=\"%.2f\" x=\"%.1f\" y=\"%.1f\" width=\"%.1f\" "
+            "height=\"%.1f\"/>\n",
             0.3 * fmin(cell->explained[0], 1.0), axes->left, axes->top, axes->width, axes->height);
-    fprintf(out, "<text class=\"tick%s\" x=\"%.1f\" y=\"%.1f\">", cell->explained[0] >= STRIKING ? " striking" : "",
-            axes->left, axes->top - 5.0);
+    fprintf(out, "<text class=\"tick%s\" x=\"%.1f\" y=\"%.1f\">",
+            cell->explained[0] >= STRIKING ? " striking" : "", axes->left, axes->top - 5.0);
     markup_percent(out, cell->explained[0]);
     fputs(" \xe2\x86\x92 ", out);
     markup_percent(out, cell->explained[1]);
@@ -280,11 +289,11 @@ static void draw_cell(FILE *out, const struct axes *axes, const struct cell *cel
     draw_curve(out, axes, &cell->curve[1], "band after", "line after");
     axes_frame(out, axes);
     fputs("</g>\n", out);
-    (void)variable;
 }
 
-static void draw_row(FILE *out, struct sample *sample, const struct report_series *series, const struct matrix *matrix,
-                     size_t r, const struct variable *variable, double (*span)[2], size_t variables, double top, bool last) {
+static void draw_row(FILE *out, struct sample *sample, const struct report_series *series,
+                     const struct matrix *matrix, size_t r, const struct variable *variable,
+                     double (*span)[2], size_t variables, double top, bool last) {
     const struct residual *residual = &matrix->residual[r];
     struct cell cell[VARIABLES_MAX];
     double range[2] = {0.0, 0.0};
@@ -296,58 +305,78 @@ static void draw_row(FILE *out, struct sample *sample, const struct report_serie
         include_curve(&cell[v].curve[1], range);
     }
     axes_widen(&range[0], &range[1], residual->least);
-    fprintf(out, "<text class=\"title\" x=\"0\" y=\"%.1f\">%s</text><text class=\"tick\" x=\"0\" y=\"%.1f\">%s</text>"
-                 "<text class=\"tick\" x=\"0\" y=\"%.1f\">/ %s</text>\n",
-            top + 0.5 * CELL_HEIGHT - 12.0, residual->name, top + 0.5 * CELL_HEIGHT + 5.0, residual->of,
-            top + 0.5 * CELL_HEIGHT + 22.0, residual->unit);
+    fprintf(
+        out,
+        "<text class=\"title\" x=\"0\" y=\"%.1f\">%s</text><text class=\"tick\" x=\"0\" y=\"%.1f\">%s</text>"
+        "<text class=\"tick\" x=\"0\" y=\"%.1f\">/ %s</text>\n",
+        top + 0.5 * CELL_HEIGHT - 12.0, residual->name, top + 0.5 * CELL_HEIGHT + 5.0, residual->of,
+        top + 0.5 * CELL_HEIGHT + 22.0, residual->unit);
     for (size_t v = 0; v < variables; v++) {
         const bool turns = variable[v].column == REPORT_DIRECTION;
-        const struct axes axes = {cell_left(v), top,      CELL_WIDTH, CELL_HEIGHT,         span[v][0], span[v][1],
-                                  range[0],     range[1], turns ? 90.0 : 0.0, 0.0, 0.0};
+        const struct axes axes = {cell_left(v), top,        CELL_WIDTH,
+                                  CELL_HEIGHT,  span[v][0], span[v][1],
+                                  range[0],     range[1],   turns ? CHAMBERS_APART_DEG : 0.0,
+                                  0.0,          0.0};
         if (!cell[v].empty) {
-            draw_cell(out, &axes, &cell[v], &variable[v], v == 0, last);
+            draw_cell(out, &axes, &cell[v], v == 0, last);
         }
     }
 }
 
 static void draw_heads(FILE *out, const struct variable *variable, size_t variables) {
     for (size_t v = 0; v < variables; v++) {
-        fprintf(out, "<text class=\"title\" x=\"%.1f\" y=\"13\">%s / %s</text>\n", cell_left(v), variable[v].name,
-                variable[v].unit);
+        fprintf(out,
+                "<text class=\"title\" x=\"%.1f\" y=\"13\">%s</text><text class=\"tick\" x=\"%.1f\" "
+                "y=\"28\">%s</text>\n",
+                cell_left(v), variable[v].name, cell_left(v), variable[v].unit);
     }
 }
 
-static void draw_matrix(FILE *out, struct sample *sample, const struct report_series *series, const struct gap_data *data,
-                        const struct matrix *matrix) {
-    struct variable variable[VARIABLES_MAX];
-    double span[VARIABLES_MAX][2];
-    size_t shown[REPORT_RESIDUALS], rows = 0;
-    const size_t variables = list_variables(series, data, matrix->tip, variable);
-    for (size_t v = 0; v < variables; v++) {
-        span_of(sample, series, matrix, &variable[v], span[v]);
-    }
+/* Which residuals there is enough of. */
+static size_t list_rows(struct sample *sample, const struct report_series *series,
+                        const struct matrix *matrix, size_t shown[REPORT_RESIDUALS]) {
+    size_t rows = 0;
     for (size_t r = 0; r < matrix->residuals; r++) {
         collect(sample, series, matrix->tip, REPORT_TIME, matrix->residual[r].offset);
         if (sample->count >= BIN_LEAST) {
             shown[rows++] = r;
         }
     }
+    return rows;
+}
+
+static void draw_matrix(FILE *out, struct sample *sample, const struct report_series *series,
+                        const struct gap_data *data, const struct matrix *matrix) {
+    struct variable variable[VARIABLES_MAX];
+    double span[VARIABLES_MAX][2];
+    size_t shown[REPORT_RESIDUALS];
+    const size_t rows = list_rows(sample, series, matrix, shown);
     if (rows == 0) {
+        fprintf(out, "<p class=\"muted\">%s</p>\n",
+                matrix->tip ? "The logs have no tip samples to compare."
+                            : "Pressures are compared only where duties and readings were logged.");
         return;
     }
+    const size_t variables = list_variables(series, data, matrix->tip, variable);
+    for (size_t v = 0; v < variables; v++) {
+        span_of(sample, series, matrix, &variable[v], span[v]);
+    }
     const double height = HEAD_ROOM + (double)rows * ROW_PITCH + FOOT_ROOM - (ROW_PITCH - CELL_HEIGHT);
-    fprintf(out, "<div class=\"scroll\"><svg width=\"%.0f\" height=\"%.0f\" viewBox=\"0 0 %.0f %.0f\" role=\"img\" "
-                 "aria-label=\"%s residuals against each variable\">\n",
-            FIGURE_WIDTH, height, FIGURE_WIDTH, height, matrix->tip ? "tip" : "pressure");
+    fprintf(
+        out,
+        "<div class=\"scroll\"><svg width=\"%.0f\" height=\"%.0f\" viewBox=\"0 0 %.0f %.0f\" role=\"img\" "
+        "aria-label=\"%s residuals against each variable\">\n",
+        FIGURE_WIDTH, height, FIGURE_WIDTH, height, matrix->tip ? "tip" : "pressure");
     draw_heads(out, variable, variables);
     for (size_t k = 0; k < rows; k++) {
-        draw_row(out, sample, series, matrix, shown[k], variable, span, variables, HEAD_ROOM + ROW_PITCH * (double)k,
-                 k + 1 == rows);
+        draw_row(out, sample, series, matrix, shown[k], variable, span, variables,
+                 HEAD_ROOM + ROW_PITCH * (double)k, k + 1 == rows);
     }
     fputs("</svg></div>\n", out);
 }
 
-static bool draw(FILE *out, const struct report_series *series, const struct gap_data *data, const struct matrix *matrix) {
+static bool draw(FILE *out, const struct report_series *series, const struct gap_data *data,
+                 const struct matrix *matrix) {
     struct sample sample;
     const bool sound = sample_open(&sample, series, matrix->tip);
     if (sound) {
@@ -358,9 +387,12 @@ static bool draw(FILE *out, const struct report_series *series, const struct gap
 }
 
 bool report_residuals(FILE *out, const struct report_series *series, const struct gap_data *data) {
-    fputs("<p class=\"legend\"><span class=\"swatch before\"></span>nominal model, before <span class=\"swatch after\"></span>"
-          "best model, after \xe2\x80\x94 line: median, band: middle half. The figures over each picture: the share of the "
-          "residual\xe2\x80\x99s variance that a function of this variable alone takes off, before \xe2\x86\x92 after; the "
+    fputs("<p class=\"legend\"><span class=\"swatch before\"></span>nominal model, before <span "
+          "class=\"swatch after\"></span>"
+          "best model, after \xe2\x80\x94 line: median, band: middle half. The figures over each picture: "
+          "the share of the "
+          "residual\xe2\x80\x99s variance that a function of this variable alone takes off, before "
+          "\xe2\x86\x92 after; the "
           "deeper the ground, the more.</p>\n",
           out);
     return draw(out, series, data, &pressures) && draw(out, series, data, &tips);

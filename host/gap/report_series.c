@@ -5,10 +5,10 @@
 #include <string.h>
 
 #define DEGREES (180.0 / M_PI)
-#define STEP_S 1e-3
+#define STEP_S (1e-6 * REPLAY_STEP_US)
 /* Lengths of the replay's blocks. */
-#define PRESSURE_BLOCK_STEPS 20
-#define TIP_BLOCK_S 0.05
+#define PRESSURE_BLOCK_STEPS ((size_t)(REPLAY_PRESSURE_BLOCK_S / STEP_S + 0.5))
+#define TIP_BLOCK_S REPLAY_TIP_BLOCK_S
 /* Of a straighter tip the direction is noise. */
 #define STRAIGHT_BELOW_DEG 3.0
 #define STRAIGHT_BELOW_MM 1.0
@@ -20,7 +20,7 @@ static double *row_of(const struct report_table *table, size_t row) {
 static bool table_open(struct report_table *table, size_t rows) {
     table->cell = malloc((rows + 1) * REPORT_COLUMNS * sizeof(double));
     table->rows = table->cell == NULL ? 0 : rows;
-    for (size_t i = 0; i < table->rows * REPORT_COLUMNS; i++) {
+    for (size_t i = 0; i < (rows + 1) * REPORT_COLUMNS && table->cell != NULL; i++) {
         table->cell[i] = NAN;
     }
     return table->cell != NULL;
@@ -56,7 +56,8 @@ static void multiply(const double a[4], const double b[4], double product[4]) {
 
 /* The rotation vector's inverse, as a quaternion. */
 static void undo(const double rotation[3], double quaternion[4]) {
-    const double angle = sqrt(rotation[0] * rotation[0] + rotation[1] * rotation[1] + rotation[2] * rotation[2]);
+    const double angle =
+        sqrt(rotation[0] * rotation[0] + rotation[1] * rotation[1] + rotation[2] * rotation[2]);
     const double share = angle > 1e-12 ? sin(0.5 * angle) / angle : 0.5;
     quaternion[0] = cos(0.5 * angle);
     for (size_t k = 0; k < 3; k++) {
@@ -196,9 +197,13 @@ static void put_position(double *row, size_t simulated, size_t off, const double
     }
     split(difference_mm, &row[REPORT_BEFORE + REPORT_TIP_X], STRAIGHT_BELOW_MM, &row[off + REPORT_OFF_ALONG]);
     row[off + REPORT_OFF_HEIGHT] = difference_mm[2];
+    row[simulated == REPORT_BEFORE ? REPORT_APART_BEFORE : REPORT_APART_AFTER] =
+        sqrt(difference_mm[0] * difference_mm[0] + difference_mm[1] * difference_mm[1] +
+             difference_mm[2] * difference_mm[2]);
 }
 
-static void put_orientation(double *row, size_t simulated, size_t off, const double measured[4], const double rotation[3]) {
+static void put_orientation(double *row, size_t simulated, size_t off, const double measured[4],
+                            const double rotation[3]) {
     double back[4], quaternion[4], bend_deg[2], measured_deg[2], axis[3];
     undo(rotation, back);
     multiply(back, measured, quaternion);
@@ -209,7 +214,8 @@ static void put_orientation(double *row, size_t simulated, size_t off, const dou
     const double towards[2] = {bend_deg[0], bend_deg[1]};
     split(difference, towards, STRAIGHT_BELOW_DEG, &row[off + REPORT_TURNED_ALONG]);
     tip_axis(measured, axis);
-    row[off + REPORT_TWISTED] = DEGREES * (rotation[0] * axis[0] + rotation[1] * axis[1] + rotation[2] * axis[2]);
+    row[off + REPORT_TWISTED] =
+        DEGREES * (rotation[0] * axis[0] + rotation[1] * axis[1] + rotation[2] * axis[2]);
 }
 
 static void put_tips(const struct replay *replay, const struct replay_run *run, const struct pose_sum *pose,
@@ -235,22 +241,25 @@ static void put_tips(const struct replay *replay, const struct replay_run *run, 
 /* --- variables --- */
 
 /* What the best model, corrected by the readings, says of a chamber's pressure. */
-static double estimate_kpa(const struct replay_run *run, const struct replay_state *state, size_t index, size_t step,
-                           size_t chamber) {
+static double estimate_kpa(const struct replay_run *run, const struct replay_state *state, size_t index,
+                           size_t step, size_t chamber) {
     const size_t kept = step < run->steps ? step : run->steps, block = kept / PRESSURE_BLOCK_STEPS;
-    return 1e-3 * (state->pressure_pa[index][3 * kept + chamber] + state->correction[index][3 * block + chamber]);
+    return 1e-3 *
+           (state->pressure_pa[index][3 * kept + chamber] + state->correction[index][3 * block + chamber]);
 }
 
-static void put_variables(const struct replay_run *run, const struct replay_state *state, size_t index, double block_s,
-                          struct report_table *table) {
+static void put_variables(const struct replay_run *run, const struct replay_state *state, size_t index,
+                          double block_s, struct report_table *table) {
     const double steps = block_s / STEP_S;
     for (size_t b = 0; b < table->rows; b++) {
         double *row = row_of(table, b), rate_sum = 0.0;
         const double first = fmax(((double)b - 0.5) * steps, 0.0);
-        const size_t from = (size_t)first, middle = (size_t)(((double)b + 0.5) * steps), to = from + (size_t)(2.0 * steps);
+        const size_t from = (size_t)first, middle = (size_t)(((double)b + 0.5) * steps),
+                     to = from + (size_t)(2.0 * steps);
         row[REPORT_TIME] = ((double)b + 0.5) * block_s;
         for (size_t c = 0; c < 3; c++) {
-            const double rise = estimate_kpa(run, state, index, to, c) - estimate_kpa(run, state, index, from, c);
+            const double rise =
+                estimate_kpa(run, state, index, to, c) - estimate_kpa(run, state, index, from, c);
             row[REPORT_PRESSURE_1 + c] = estimate_kpa(run, state, index, middle, c);
             row[REPORT_RATE_1 + c] = rise / (2.0 * block_s);
             rate_sum += row[REPORT_RATE_1 + c];

@@ -1,6 +1,6 @@
-/* What the pictures of the HTML report are drawn from: a table for each run, a row for each block over which residuals are
- * averaged, with what was measured and what the model says before (nominal) and after (the best model). Pressures in kPa,
- * positions in mm, angles in degrees; NAN: nothing was measured. */
+/* What the pictures of the HTML report are drawn from: a table for each run, a row for each block over which
+ * residuals are averaged, with what was measured and what the model says before (nominal) and after (the best
+ * model). Pressures in kPa, positions in mm, angles in degrees; NAN: nothing was measured. */
 #ifndef TRIBEND_GAP_REPORT_SERIES_H
 #define TRIBEND_GAP_REPORT_SERIES_H
 
@@ -31,8 +31,10 @@ enum report_column {
     REPORT_RATE_2,
     REPORT_RATE_3,
     REPORT_RATE_MEAN,
-    REPORT_BEND,      /* deg, or mm off the axis where no orientation was measured */
-    REPORT_DIRECTION, /* deg; NAN for a tip that is nearly straight */
+    REPORT_BEND,         /* deg, or mm off the axis where no orientation was measured */
+    REPORT_DIRECTION,    /* deg; NAN for a tip that is nearly straight */
+    REPORT_APART_BEFORE, /* mm between the tip's places, measured and simulated */
+    REPORT_APART_AFTER,
     REPORT_MEASURED,
     REPORT_BEFORE = REPORT_MEASURED + REPORT_CHANNELS,
     REPORT_AFTER = REPORT_BEFORE + REPORT_CHANNELS,

@@ -6,6 +6,7 @@
 #include <string.h>
 
 #define STARTS_MAX 4
+#define SMALL_SHARE 0.25      /* of the typical size */
 #define SCREEN_ROUNDS 1
 #define REFINE_ROUNDS 6
 #define NOMINAL_ROUNDS 6
@@ -14,13 +15,21 @@
 #define EFFECTS_MOST 3        /* on one module at once */
 #define GAIN_SHARE 0.03       /* an effect must take off this share of the held-out squares .. */
 #define GAIN_SIGMA 40.0       /* .. and so much that noise does not */
+#define REPEATS_CERTAIN 0.08  /* share of repeated samples that no noise makes */
 #define REPEATS_LEAST 0.02    /* share of repeated samples below which none is frozen */
 #define ONSETS 12
+#define COMPLETING_SHARE 0.5  /* of what is left, that a further effect must explain */
+#define POLISH_SHARE 0.002    /* of the gap: less than that is left by any form of the right effect */
+#define STRUCTURE_LEAST 0.3   /* mean square in units of a block's noise that is worth explaining */
+#define FAINT_LEFT 0.25        /* of a faint gap: more than that left means that something else was meant */
+#define FAINT 1.5             /* mean square below which a first effect, too, must explain most of what there is */
+#define PART_COST 0.03        /* an effect more must better the fit by that to go before */
 #define SHORTLIST 10          /* of the candidates that act on the gas; the best variant of each kind besides */
 
 struct candidate {
     const struct effect_kind *kind;
     size_t chamber;
+    size_t form;
 };
 
 /* --- the catalogue --- */
@@ -47,12 +56,8 @@ static bool can_show(const struct gap_data *data, const struct effect_kind *kind
     const bool duties = has_everywhere(data, offsetof(struct gap_run, has_duty));
     const bool readings = has_everywhere(data, offsetof(struct gap_run, has_reading));
     const bool tips = data->run[0].tips > 0;
-    double repeated = 0.0;
-    for (size_t i = 0; i < data->runs; i++) {
-        repeated = fmax(repeated, data->run[i].repeated_share);
-    }
     if (kind->by_chance) {
-        return repeated > REPEATS_LEAST;
+        return gap_data_repeated_share(data) > REPEATS_LEAST;
     }
     if (gap_effect_downstream(kind)) {
         return tips;
@@ -70,9 +75,15 @@ static size_t list_candidates(const struct search *search, struct candidate *lis
         if (is_without(&search->options, kind->name) || !can_show(search->data, kind)) {
             continue;
         }
+        const bool twin = strcmp(kind->name, "line_resistance") == 0 && !is_without(&search->options, "valve_sluggish");
         const size_t first = kind->scope == EFFECT_ONE_CHAMBER ? 1 : 0, last = kind->scope == EFFECT_GLOBAL ? 0 : 3;
-        for (size_t c = first; c <= last && count < SEARCH_CANDIDATES_MAX; c++) {
-            list[count++] = (struct candidate){kind, c};
+        const size_t forms = (kind->forms > 1 ? kind->forms : 1) + kind->forms_add;
+        for (size_t form = 0; form < forms; form++) {
+            for (size_t c = first; c <= last && count < SEARCH_CANDIDATES_MAX; c++) {
+                if (!(twin && c > 0 && form == 0)) {
+                    list[count++] = (struct candidate){kind, c, form};
+                }
+            }
         }
     }
     return count;
@@ -114,7 +125,10 @@ static size_t place_start(const struct effect_kind *kind, size_t k, struct effec
             effect->parameter[i] = within(parameter, 0.1 + 0.8 * spread(k, bases[i]));
         }
     }
-    return secondary ? STARTS_MAX : sign ? 2 : 1;
+    if (k == 1 && !sign && !secondary) { /* a small one: some are felt only in proportion near none */
+        effect->parameter[0] = kind->parameter[0].none + SMALL_SHARE * (kind->parameter[0].typical - kind->parameter[0].none);
+    }
+    return secondary ? STARTS_MAX : 2;
 }
 
 /* --- fits --- */
@@ -123,20 +137,17 @@ static double held_out(const struct fit *fit) {
     return fit->sound ? fit->sums.pressure[1] + fit->sums.tip[1] : INFINITY;
 }
 
+/* For an order: of two that explain the same, the one with fewer parts goes first. */
+static double rank(const struct fit *fit) {
+    return held_out(fit) * (1.0 + PART_COST * (double)fit->model.count);
+}
+
 static double held_out_count(const struct fit *fit) {
     return fit->sums.pressure_count[1] + fit->sums.tip_count[1];
 }
 
 static void add_effect(struct gap_model *model, const struct effect *effect) {
     model->effect[model->count++] = *effect;
-}
-
-static double repeated_share(const struct gap_data *data) {
-    double share = 0.0;
-    for (size_t i = 0; i < data->runs; i++) {
-        share += data->run[i].repeated_share / (double)data->runs;
-    }
-    return share;
 }
 
 static void screen(struct fitter *fitter, const struct gap_data *data, const struct gap_model *onto,
@@ -148,11 +159,18 @@ static void screen(struct fitter *fitter, const struct gap_data *data, const str
         struct effect effect;
         effect_init(&effect, candidate->kind);
         effect.chamber = candidate->chamber;
+        effect.form = candidate->form;
         starts = place_start(candidate->kind, k, &effect);
         if (candidate->kind->by_chance) {
-            effect.parameter[0] = repeated_share(data);
+            effect.parameter[0] = gap_data_repeated_share(data);
         }
+        const bool all_forms = candidate->form > 0 && candidate->form == candidate->kind->forms;
+        effect.form = all_forms ? 0 : effect.form;
         add_effect(&fit.model, &effect);
+        for (size_t form = 1; all_forms && form < candidate->kind->forms && fit.model.count < GAP_EFFECTS_MAX; form++) {
+            effect.form = form;
+            add_effect(&fit.model, &effect);
+        }
         fitter_run(fitter, &fit, SCREEN_ROUNDS, true);
         const double mine = fit.sums.pressure[0] + fit.sums.tip[0], least = best->sums.pressure[0] + best->sums.tip[0];
         if (fit.sound && (!best->sound || mine < least)) {
@@ -197,15 +215,15 @@ static void say(const struct search *search, const char *what, size_t done, size
 }
 
 static int by_held_out(const void *a, const void *b) {
-    const double x = held_out(*(const struct fit *const *)a), y = held_out(*(const struct fit *const *)b);
+    const double x = rank(*(const struct fit *const *)a), y = rank(*(const struct fit *const *)b);
     return (x > y) - (x < y);
 }
 
-static size_t model_has(const struct gap_model *model, const struct effect_kind *kind, size_t chamber) {
+static size_t model_has(const struct gap_model *model, const struct effect_kind *kind, size_t form, size_t chamber) {
     size_t found = 0;
     for (size_t e = 0; e < model->count; e++) {
         const struct effect *effect = &model->effect[e];
-        found += effect->kind == kind && (effect->chamber == chamber || effect->chamber == 0 || chamber == 0);
+        found += effect->kind == kind && effect->form == form && (effect->chamber == chamber || effect->chamber == 0 || chamber == 0);
     }
     return found;
 }
@@ -229,7 +247,7 @@ static void shortlist(struct search *search, struct crew *crew, const struct can
     for (size_t i = 0; i < count; i++) {
         const struct effect_kind *kind = list[i].kind;
         const bool on_gas = effect_has(kind, EFFECT_HOOK_COMMAND) || effect_has(kind, EFFECT_HOOK_GAS);
-        if (!on_gas || (i > 0 && list[i - 1].kind == kind)) {
+        if (!on_gas || (i > 0 && list[i - 1].kind == kind && list[i - 1].form == list[i].form)) {
             continue;
         }
         size_t starts = 1;
@@ -238,9 +256,10 @@ static void shortlist(struct search *search, struct crew *crew, const struct can
             double mine[4];
             effect_init(&effect, kind);
             effect.chamber = 0;
+            effect.form = list[i].form;
             starts = place_start(kind, k, &effect);
             fitter_linear(&crew->fitter[omp_get_thread_num()], crew->fitter[0].base, base_residual, &effect, mine);
-            for (size_t j = i; j < count && list[j].kind == kind; j++) {
+            for (size_t j = i; j < count && list[j].kind == kind && list[j].form == list[i].form; j++) {
                 gain[j] = fmax(gain[j], mine[list[j].chamber]);
             }
         }
@@ -268,7 +287,7 @@ static size_t screen_all(struct search *search, struct crew *crew, const struct 
 #pragma omp parallel for schedule(dynamic, 1) num_threads(crew->count)
     for (size_t i = 0; i < count; i++) {
         fits[i] = (struct fit){.sound = false};
-        if (wanted[i] && !stopped(search) && model_has(onto, list[i].kind, list[i].chamber) == 0) {
+        if (wanted[i] && !stopped(search) && model_has(onto, list[i].kind, list[i].form, list[i].chamber) == 0) {
             screen(&crew->fitter[omp_get_thread_num()], search->data, onto, &list[i], &fits[i]);
         }
         size_t now;
@@ -298,16 +317,50 @@ static void refine(struct search *search, struct crew *crew, struct fit **order,
     }
 }
 
-/* Does the second explain so much more that its effect has earned its place? */
+/* Mean square of the held-out residuals less what noise alone makes: what is left to explain. */
+static double structure(const struct fit *fit) {
+    return fmax(fit_structure(&fit->sums, 1), 0.0);
+}
+
+/* Does the second explain so much more that its effect has earned its place? A first one must take off much; a further one
+ * must be the rest of the explanation, not polish on a form that only nearly fits. */
 static bool is_better(const struct fit *before, const struct fit *after) {
     const double gain = held_out(before) - held_out(after);
     const double noise = fmax(held_out(after) / held_out_count(after), 0.2);
     return gain > GAIN_SHARE * held_out(before) && gain > GAIN_SIGMA * noise;
 }
 
+/* The same kind twice, though its forms are alternatives and do not add up. */
+static bool repeats_kind(const struct gap_model *model) {
+    for (size_t i = 0; i < model->count; i++) {
+        for (size_t j = 0; j < i; j++) {
+            if (model->effect[i].kind == model->effect[j].kind && !model->effect[i].kind->forms_add &&
+                model->effect[i].chamber == model->effect[j].chamber) {
+                return true;
+            }
+        }
+    }
+    return false;
+}
+
+static bool earns_place(const struct search *search, const struct fit *before, const struct fit *after) {
+    const bool completes = structure(after) < (1.0 - COMPLETING_SHARE) * structure(before);
+    if (before->model.count == 0) {
+        const bool all_of_it = structure(after) < FAINT_LEFT * structure(before);
+        return is_better(before, after) && (all_of_it || structure(before) > FAINT);
+    }
+    const struct effect_kind *last = after->model.effect[after->model.count - 1].kind;
+    const bool adds = last->forms_add || gap_model_is_part(&after->model, after->model.count - 1);
+    if (adds && gap_model_kinds(&after->model) <= gap_model_kinds(&before->model) && !repeats_kind(&after->model)) {
+        return is_better(before, after); /* more of the same kind */
+    }
+    const bool was_polish = structure(before) < POLISH_SHARE * structure(&search->recalibrated);
+    return is_better(before, after) && completes && !was_polish && !repeats_kind(&after->model);
+}
+
 /* Is what the best model leaves more than noise? */
 static bool is_structured(const struct fit *fit) {
-    return fit_mean_square(&fit->sums, 1) > 1.1;
+    return structure(fit) > STRUCTURE_LEAST;
 }
 
 /* Fit both scales; smoothing and weights follow the model that comes out. */
@@ -340,6 +393,9 @@ static void find_onsets(struct search *search, struct crew *crew, struct fit *fi
         end_s = fmax(end_s, run->time_s[run->rows - 1]);
     }
     for (size_t e = 0; e < fit->model.count; e++) {
+        if (fit->model.effect[e].kind->forms_add) {
+            continue; /* its forms belong together */
+        }
         struct fit trial[ONSETS];
         const struct fit before = *fit;
 #pragma omp parallel for schedule(dynamic, 1) num_threads(crew->count)
@@ -381,7 +437,8 @@ static size_t pair_up(struct fit *const *single, size_t singles, struct fit *pai
     for (size_t i = 0; i < singles; i++) {
         for (size_t j = i + 1; j < singles; j++) {
             const struct effect *other = &single[j]->model.effect[0];
-            if (model_has(&single[i]->model, other->kind, other->chamber) == 0) {
+            const bool whole = single[i]->model.count > 1 || single[j]->model.count > 1;
+            if (!whole && model_has(&single[i]->model, other->kind, other->form, other->chamber) == 0) {
                 pairs[count] = (struct fit){.model = single[i]->model};
                 add_effect(&pairs[count].model, other);
                 count++;
@@ -412,14 +469,14 @@ static bool add_one(struct search *search, struct workspace *room, size_t step) 
         size_t count = screen_all(search, &crew, &search->best.model, room->list, room->candidates, room->fits, room->order);
         count = count < REFINED_MAX ? count : REFINED_MAX;
         refine(search, &crew, room->order, count, step);
-        if (count > 0 && is_better(&search->best, room->order[0])) {
-            next = *room->order[0];
-            found = true;
+        for (size_t i = 0; i < count && !found; i++) {
+            found = earns_place(search, &search->best, room->order[i]);
+            next = found ? *room->order[i] : next;
         }
         for (size_t i = 0; step == 0 && i < count && i < PAIRED_MAX; i++) {
             room->single[room->singles++] = *room->order[i];
         }
-        if (step == 1) {
+        if (step == 1 && room->singles > 1) {
             struct fit *singles[PAIRED_MAX];
             for (size_t i = 0; i < room->singles; i++) {
                 singles[i] = &room->single[i];
@@ -431,7 +488,7 @@ static bool add_one(struct search *search, struct workspace *room, size_t step) 
             say(search, "pairs", 0, pairs);
             refine(search, &crew, room->pair_order, pairs, step);
             if (pairs > 0 && held_out(room->pair_order[0]) < held_out(&next) &&
-                is_better(&search->best, room->pair_order[0])) {
+                earns_place(search, &search->best, room->pair_order[0])) {
                 next = *room->pair_order[0];
                 found = true;
             }
@@ -463,7 +520,7 @@ static void drop_idle(struct search *search) {
             }
             crew_close(&crew);
             fit_base_close(&base, &search->replay);
-            if (!is_better(&without, &search->best)) {
+            if (!earns_place(search, &without, &search->best)) {
                 search->best = without;
                 dropped = true;
                 break;
@@ -499,6 +556,49 @@ static bool fit_everything(struct search *search) {
     return sound;
 }
 
+/* What changes pressures only slightly shows best at the tip, once the pressures are taken to be what the duties make of them:
+ * near ninety degrees a few pascals turn it more than its sensor errs. */
+static bool look_closer(struct search *search, struct workspace *room) {
+    search->replay.rigid = true;
+    search->trials = 0;
+    room->singles = 0;
+    const struct gap_model plain = {.stiffness_scale = 1.0, .supply_scale = 1.0};
+    search->nominal.model = plain;
+    bool sound = recalibrate(search, &search->nominal, false) && recalibrate(search, &search->recalibrated, true);
+    search->best = search->recalibrated;
+    for (size_t step = 0; step < 2 && sound && !stopped(search) && is_structured(&search->best); step++) {
+        if (!add_one(search, room, step)) {
+            break;
+        }
+        sound = recalibrate(search, &search->best, true);
+    }
+    return sound;
+}
+
+/* Repeated samples are seen as such: no fit has to find them. */
+static bool take_repeats(struct search *search) {
+    const struct effect_kind *kind = effect_kind_find("tip_freeze");
+    const double share = gap_data_repeated_share(search->data);
+    if (kind == NULL || is_without(&search->options, kind->name) || share < REPEATS_CERTAIN) {
+        return true;
+    }
+    struct effect effect;
+    struct fit with = search->recalibrated;
+    effect_init(&effect, kind);
+    effect.parameter[0] = share;
+    add_effect(&with.model, &effect);
+    const bool sound = recalibrate(search, &with, true);
+    if (sound) {
+        search->best = with;
+        search->trial[search->trials++] = (struct search_trial){with, 0};
+    }
+    return sound;
+}
+
+static bool all_have_duties(const struct gap_data *data) {
+    return has_everywhere(data, offsetof(struct gap_run, has_duty)) && data->run[0].tips > 0;
+}
+
 bool search_run(struct search *search, const struct gap_data *data, const struct bend_table *table,
                 const struct plant_parameters *nominal, const struct search_options *options) {
     struct workspace *room = calloc(1, sizeof *room);
@@ -516,15 +616,24 @@ bool search_run(struct search *search, const struct gap_data *data, const struct
     search->best = search->recalibrated;
     if (sound) {
         room->candidates = list_candidates(search, room->list);
+        sound = take_repeats(search);
     }
-    for (size_t step = 0; step < EFFECTS_MOST && sound && !stopped(search); step++) {
-        if (step > 0 && !is_structured(&search->best)) {
+    const bool faint = structure(&search->best) < FAINT && all_have_duties(data);
+    for (size_t step = search->best.model.count; step < EFFECTS_MOST && sound && !stopped(search) && !faint; step++) {
+        if (search->best.model.count + 3 > GAP_EFFECTS_MAX) {
+            break;
+        }
+        const bool polished = structure(&search->best) < POLISH_SHARE * structure(&search->recalibrated);
+        if (step > 0 && (polished || !is_structured(&search->best))) {
             break;
         }
         if (!add_one(search, room, step)) {
             break;
         }
         sound = recalibrate(search, &search->best, true);
+    }
+    if (sound && !stopped(search) && search->best.model.count == 0 && all_have_duties(data)) {
+        sound = look_closer(search, room);
     }
     if (sound && !stopped(search)) {
         drop_idle(search);

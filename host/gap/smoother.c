@@ -76,6 +76,8 @@ static void look_back(struct belief *now, const struct belief *ahead, const stru
     now->level += gll * dl + gls * ds;
     now->slope += gsl * dl + gss * ds;
     now->ll += gll * gll * vll + 2.0 * gll * gls * vls + gls * gls * vss;
+    now->ls += gll * gsl * vll + (gll * gss + gls * gsl) * vls + gls * gss * vss;
+    now->ss += gsl * gsl * vll + 2.0 * gsl * gss * vls + gss * gss * vss;
 }
 
 static bool smooth(const struct smoother *smoother, const double *observed, const double *variance, size_t count,
@@ -118,12 +120,12 @@ bool smoother_run(const struct smoother *smoother, const double *observed, const
     return smooth(smoother, observed, variance, count, level, NULL);
 }
 
-bool smoother_fit(struct smoother *smoother, const double *observed, const double *variance, size_t count,
+bool smoother_fit(struct smoother *smoother, const double *observed, const double *variance, size_t count, bool rigid,
                   bool with_slope) {
     struct smoother best = {0.0, 0.0, 0.0};
     double most = with_slope ? -INFINITY : likelihood(&best, observed, variance, count);
     double drift = CHOICE_FIRST;
-    for (int i = 0; i < CHOICES; i++, drift *= CHOICE_FACTOR) {
+    for (int i = 0; i < CHOICES && !rigid; i++, drift *= CHOICE_FACTOR) {
         const struct smoother trial = {with_slope ? 0.0 : drift, with_slope ? drift : 0.0, 0.0};
         const double value = likelihood(&trial, observed, variance, count);
         if (value > most) {

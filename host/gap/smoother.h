@@ -14,8 +14,9 @@ struct smoother {
 /* observed[i] with variance[i] (infinite: nothing was seen); `level` gets the smoothed level. False: out of memory. */
 bool smoother_run(const struct smoother *smoother, const double *observed, const double *variance, size_t count,
                   double *level);
-/* The drift (and, where `with_slope`, the swing) under which the observations are most likely, and the spread. */
-bool smoother_fit(struct smoother *smoother, const double *observed, const double *variance, size_t count,
+/* The drift (and, where `with_slope`, the swing) under which the observations are most likely, and the spread. `rigid`: the level is a
+ * constant whatever was observed. */
+bool smoother_fit(struct smoother *smoother, const double *observed, const double *variance, size_t count, bool rigid,
                   bool with_slope);
 
 #endif

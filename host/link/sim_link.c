@@ -58,20 +58,31 @@ static void sim_link_close(void *context) {
     (void)context; /* nothing is held */
 }
 
-void sim_link_open(struct sim_link *link, const struct bend_table *table, uint64_t seed, struct link *interface) {
-    struct sim_parameters sim_parameters;
-    struct controller_parameters controller_parameters;
+void sim_link_default_setup(struct sim_link_setup *setup, const struct bend_table *table, uint64_t seed) {
+    memset(setup, 0, sizeof *setup);
+    setup->module_table = table;
+    setup->controller_table = table;
+    setup->seed = seed;
+    sim_default_parameters(&setup->sim);
+    controller_default_parameters(&setup->controller, table);
+}
+
+void sim_link_open_setup(struct sim_link *link, const struct sim_link_setup *setup, struct link *interface) {
     memset(link, 0, sizeof *link);
-    sim_default_parameters(&sim_parameters);
-    sim_init(&link->sim, table, &sim_parameters, seed);
+    sim_init(&link->sim, setup->module_table, &setup->sim, setup->seed);
     sim_bind(&link->sim, &link->plant);
     link->tapped = (struct hal){.context = link,
                                 .time_us = tap_time_us,
                                 .read_pressures = tap_read_pressures,
                                 .read_tip = tap_read_tip,
                                 .write_outputs = tap_write_outputs};
-    controller_default_parameters(&controller_parameters, table);
-    app_init(&link->app, &link->tapped, table, &controller_parameters);
+    app_init(&link->app, &link->tapped, setup->controller_table, &setup->controller);
     *interface = (struct link){
         .context = link, .send = sim_link_send, .receive = sim_link_receive, .close = sim_link_close};
+}
+
+void sim_link_open(struct sim_link *link, const struct bend_table *table, uint64_t seed, struct link *interface) {
+    struct sim_link_setup setup;
+    sim_link_default_setup(&setup, table, seed);
+    sim_link_open_setup(link, &setup, interface);
 }

@@ -14,7 +14,20 @@ struct sim_link {
     struct link_report report;
 };
 
-/* `table` is kept by pointer. */
+/* Both tables are kept by pointer. Where they differ, the controller does not know the module as it is, or knows it
+ * better than the module's table does. */
+struct sim_link_setup {
+    const struct bend_table *module_table;
+    const struct bend_table *controller_table;
+    struct sim_parameters sim;
+    struct controller_parameters controller;
+    uint64_t seed;
+};
+
+/* The nominal module and a controller that takes it for that. */
+void sim_link_default_setup(struct sim_link_setup *setup, const struct bend_table *table, uint64_t seed);
+void sim_link_open_setup(struct sim_link *link, const struct sim_link_setup *setup, struct link *interface);
+/* With the default setup. */
 void sim_link_open(struct sim_link *link, const struct bend_table *table, uint64_t seed, struct link *interface);
 
 #endif

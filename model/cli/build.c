@@ -8,12 +8,14 @@
 
 
 #include "cli/cli.h"
+#include "description/calibration_file.h"
 #include "table/table_builder.h"
 
 
 struct arguments {
     const char *module;
     const char *material;
+    const char *calibration;
     const char *output;
     struct table_build_options build;
     bool quiet;
@@ -23,6 +25,7 @@ struct arguments {
 static const struct argp_option options[] = {
     {"output", 'o', "FILE", 0, "the table to write (default MODULE.tbt)", 0},
     {"material", 'm', "NAME", 0, "a material from tables/materials, or the path of a YAML file", 0},
+    {"calibration", 'c', "FILE", 0, "scale every stiffness as `tribend gap diagnose` found it", 0},
     {"nodes", 'n', "COUNT", 0, "nodes on each pressure axis, 4 to 32 (default 17)", 0},
     {"mesh-size", 's', "LENGTH", 0, "element size at chamber walls (default 0.75mm)", 0},
     {"resume", 'r', NULL, 0, "keep finished slabs in FILE.points, and go on from those that are there", 0},
@@ -38,6 +41,9 @@ static error_t parse(int key, char *argument, struct argp_state *state) {
         return 0;
     case 'm':
         arguments->material = argument;
+        return 0;
+    case 'c':
+        arguments->calibration = argument;
         return 0;
     case 'n':
         arguments->build.nodes = strtoul(argument, &end, 10);
@@ -84,6 +90,26 @@ static double peak_memory_mib(void) {
     return getrusage(RUSAGE_SELF, &usage) == 0 ? (double)usage.ru_maxrss / 1024.0 : 0.0;
 }
 
+/* Of a calibration only the stiffness enters a table; what else it holds is the simulation's and the controller's. */
+static bool calibrate(const struct arguments *arguments, struct module_description *module, bool first_rank,
+                      struct description_error *error) {
+    if (arguments->calibration == NULL) {
+        return true;
+    }
+    struct calibration_file *file = calibration_file_read(arguments->calibration, module->name, error);
+    if (file == NULL) {
+        return false;
+    }
+    const double scale = file->stiffness_scale.value;
+    module_description_stiffen(module, scale);
+    if (first_rank) {
+        printf("stiffness x %.4g by %s; do not give this calibration together with the table again\n", scale,
+               arguments->calibration);
+    }
+    calibration_file_free(file);
+    return true;
+}
+
 static int run(struct arguments *arguments, bool first_rank) {
     char path[PROGRAM_PATH_BYTES], message[PROGRAM_ERROR_BYTES], output[PROGRAM_PATH_BYTES];
     char keep[PROGRAM_PATH_BYTES + 8];
@@ -92,7 +118,8 @@ static int run(struct arguments *arguments, bool first_rank) {
     struct table_image image;
     struct cli_progress progress = {.what = "equilibria"};
     cli_table_path("modules", arguments->module, path);
-    if (!module_description_read(path, arguments->material, &module, &error)) {
+    if (!module_description_read(path, arguments->material, &module, &error) ||
+        !calibrate(arguments, &module, first_rank, &error)) {
         return first_rank ? program_fail(EXIT_BAD_INPUT, "%s", error.text) : EXIT_BAD_INPUT;
     }
     (void)snprintf(output, sizeof output, "%s%s", arguments->output != NULL ? arguments->output : module.name,

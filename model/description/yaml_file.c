@@ -40,6 +40,19 @@ static void capture_log(cyaml_log_t level, void *context, const char *format, va
 const cyaml_config_t yaml_config = {
     .log_fn = capture_log, .mem_fn = cyaml_mem, .log_level = CYAML_LOG_ERROR, .flags = CYAML_CFG_DEFAULT};
 
+#define UNEXPECTED "Unexpected key: "
+
+/* libcyaml names the line before an unexpected key. */
+static int line_of(const struct capture *capture, const char *path) {
+    char key[sizeof capture->what];
+    if (strncmp(capture->what, UNEXPECTED, strlen(UNEXPECTED)) != 0) {
+        return capture->line;
+    }
+    (void)snprintf(key, sizeof key, "%s", capture->what + strlen(UNEXPECTED));
+    const int line = yaml_file_line(path, key, 1);
+    return line > 0 ? line : capture->line;
+}
+
 bool yaml_file_load(const char *path, const cyaml_schema_value_t *schema, void **data, struct description_error *error) {
     struct capture capture = {.what = "", .where = "", .line = 0};
     cyaml_config_t config = yaml_config;
@@ -57,13 +70,12 @@ bool yaml_file_load(const char *path, const cyaml_schema_value_t *schema, void *
         return true;
     }
     (void)snprintf(error->text, sizeof error->text, "%s:%d: %s%s%s (%s); see tables/README.md for the keys", path,
-                   capture.line, capture.what[0] == '\0' ? cyaml_strerror(result) : capture.what,
+                   line_of(&capture, path), capture.what[0] == '\0' ? cyaml_strerror(result) : capture.what,
                    capture.where[0] == '\0' ? "" : ", ", capture.where, cyaml_strerror(result));
     return false;
 }
 
-/* Line of the `occurrence`-th line whose first word is `key:`, 0 when there is none. */
-static int line_of_key(const char *path, const char *key, int occurrence) {
+int yaml_file_line(const char *path, const char *key, int occurrence) {
     FILE *file = fopen(path, "r");
     char text[LINE_BYTES];
     int line = 0, seen = 0, found = 0;
@@ -83,7 +95,7 @@ static int line_of_key(const char *path, const char *key, int occurrence) {
 
 bool yaml_file_reject(struct description_error *error, const char *path, const char *key, int occurrence,
                       const char *format, ...) {
-    const int length = snprintf(error->text, sizeof error->text, "%s:%d: %s: ", path, line_of_key(path, key, occurrence),
+    const int length = snprintf(error->text, sizeof error->text, "%s:%d: %s: ", path, yaml_file_line(path, key, occurrence),
                                 key);
     const size_t used = length < 0 ? 0 : (size_t)length;
     va_list arguments;

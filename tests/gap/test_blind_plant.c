@@ -129,10 +129,10 @@ static void agrees_with_the_simulator_where_nothing_is_wrong(void **state) {
     }
     assert_false(plant.failed);
     assert_true(tips > 3000);
-    /* the sensors' noise over ten, or half the rounding of their words: what differs does not show */
+    /* a tenth of the sensors' noise: what differs does not show */
     assert_under(pressure_pa, 15.0);
-    assert_under(position_m, 5.5e-5);
-    assert_under(2.0 * turn * DEGREES, 0.1);
+    assert_under(position_m, 2e-6);
+    assert_under(2.0 * turn * DEGREES, 0.0012);
     blind_field_close(&field);
 }
 

@@ -26,7 +26,7 @@ static void a_pulse_fills_for_its_length_less_the_difference_of_delays(void **st
     for (int on_us = 0; on_us <= 8500; on_us += 250) {
         struct valve valve;
         valve_init(&valve);
-        valve_start_period(&valve, &valve_parameters, 0, (double)on_us / 10000.0);
+        valve_start_period(&valve, &valve_parameters, 0, 0, (double)on_us / 10000.0);
         const int64_t expected_us = on_us <= 1500 ? 0 : on_us - 500;
         assert_int_equal(filled_us(&valve, 0, 10000), expected_us);
         assert_false(valve_fills(&valve, 1499));
@@ -39,7 +39,7 @@ static void full_duty_never_closes_between_periods(void **state) {
     valve_init(&valve);
     int64_t filled = 0;
     for (int64_t start_us = 0; start_us < 50000; start_us += 10000) {
-        valve_start_period(&valve, &valve_parameters, start_us, 1.0);
+        valve_start_period(&valve, &valve_parameters, start_us, 0, 1.0);
         filled += filled_us(&valve, start_us, start_us + 10000);
     }
     assert_int_equal(filled, 50000 - 1500);
@@ -49,11 +49,11 @@ static void a_cut_valve_vents_after_its_close_delay(void **state) {
     (void)state;
     struct valve valve;
     valve_init(&valve);
-    valve_start_period(&valve, &valve_parameters, 0, 0.8);
+    valve_start_period(&valve, &valve_parameters, 0, 0, 0.8);
     valve_cut(&valve, &valve_parameters, 4000);
     assert_true(valve_fills(&valve, 4999));
     assert_false(valve_fills(&valve, 5000));
-    valve_start_period(&valve, &valve_parameters, 10000, 0.8);
+    valve_start_period(&valve, &valve_parameters, 10000, 0, 0.8);
     valve_cut(&valve, &valve_parameters, 11000); /* before it opened: it never does */
     assert_int_equal(filled_us(&valve, 11000, 20000), 0);
 }
@@ -260,7 +260,7 @@ static const struct bend_table_module module = {.chamber_length_m = 0.055f, .act
 
 static void a_straight_module_stands_up(void **state) {
     (void)state;
-    const struct body_shape shape = {0.0, 0.0, 1.02};
+    const struct body_shape shape = {0.0, 0.0, 1.02, 1.0};
     struct tip_pose pose;
     body_tip_pose(&module, &shape, &pose);
     assert_close(pose.position_m[0], 0.0, 1e-12);
@@ -273,7 +273,7 @@ static void a_quarter_turn_is_where_geometry_says(void **state) {
     (void)state;
     for (int d = 0; d < 12; d++) {
         const double direction = d * M_PI / 6.0;
-        const struct body_shape shape = {0.5 * M_PI * cos(direction), 0.5 * M_PI * sin(direction), 1.0};
+        const struct body_shape shape = {0.5 * M_PI * cos(direction), 0.5 * M_PI * sin(direction), 1.0, 1.0};
         struct tip_pose pose;
         body_tip_pose(&module, &shape, &pose);
         const double radius_m = 0.055 / (0.5 * M_PI);
@@ -343,7 +343,7 @@ static void tip_noise_has_the_stated_spread(void **state) {
     struct sim_parameters parameters;
     struct random_stream random;
     struct tip_pose pose;
-    const struct body_shape shape = {0.8, 0.3, 1.0};
+    const struct body_shape shape = {0.8, 0.3, 1.0, 1.0};
     double position = 0.0, angle = 0.0;
     enum { SAMPLES = 50000 };
     sim_default_parameters(&parameters);

@@ -146,6 +146,21 @@ else
     failed=$((failed + 1))
 fi
 
+# --- calibrations: test_calibration.c has the messages; here, that each program gives them
+cat >"$scratch/soft.yaml" <<'YAML'
+module: paper-semicircle
+stiffness_scale: { value: 0.9 }
+supply_scale: { value: 1 }
+effects: []
+YAML
+sed 's/paper-semicircle/paper-circle/' "$scratch/soft.yaml" >"$scratch/circle.yaml"
+sed 's/0\.9/0.9kPa/' "$scratch/soft.yaml" >"$scratch/unit.yaml"
+expect calibration_of_another_module 3 'circle.yaml:1: module: .*paper-circle, not of paper-semicircle' "$tribend" bend 10deg -q --calibration "$scratch/circle.yaml"
+expect calibration_with_a_unit 3 "unit.yaml:2: value: '0.9kPa'" "$tribend" pressure 0kPa 0kPa 0kPa -q --controller-calibration "$scratch/unit.yaml"
+expect calibration_missing 3 'none.yaml' "$tribend" status --calibration "$scratch/none.yaml"
+expect table_of_another_calibration 3 'circle.yaml:1: module' "$tables" build paper-semicircle --calibration "$scratch/circle.yaml" -o "$scratch/out/table.tbt"
+expect drill_on_a_calibrated_controller 6 'FAULT.*corrupt' "$tribend" bend 40deg --for 4s -q --drill table-corrupt@1s --controller-calibration "$scratch/soft.yaml"
+
 # --- Ctrl-C: vents, keeps the log, 130
 echo "[ RUN      ] interrupted_run"
 "$tribend" bend 40deg --for 1440min --record "$scratch/interrupted.csv" >"$scratch/stdout" 2>&1 &

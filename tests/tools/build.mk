@@ -10,7 +10,7 @@ LINT_PACKAGES  := clang clang-tidy cppcheck gcc-arm-none-eabi libnewlib-arm-none
 FIRMWARE_C := $(wildcard firmware/*.c firmware/*/*.c)
 SIM_C      := $(wildcard hal/sim/*.c hal/sim/effects/*.c)
 MODEL_C    := $(filter-out model/cli/%,$(wildcard model/*/*.c))
-SHARED_C    := $(wildcard model/units/*.c model/program/*.c) model/description/yaml_file.c
+SHARED_C    := $(wildcard model/units/*.c model/program/*.c) model/description/yaml_file.c model/description/calibration_file.c
 TABLES_CLI_C := $(wildcard model/cli/*.c)
 HOST_C     := $(filter-out host/cli/main.c,$(wildcard host/*/*.c))
 HOST_MAIN  := host/cli/main.c
@@ -18,8 +18,11 @@ TEST_C     := $(wildcard tests/*/test_*.c)
 BENCH_C    := $(wildcard tests/bench/bench_*.c)
 SUPPORT_C  := $(filter-out $(TEST_C) $(BENCH_C),$(wildcard tests/*/*.c))
 SOLID_C    := $(wildcard tests/model/ccx/*.c)
-ALL_C      := $(FIRMWARE_C) $(SIM_C) $(MODEL_C) $(TABLES_CLI_C) $(HOST_C) $(HOST_MAIN) $(TEST_C) $(BENCH_C) $(SUPPORT_C) $(SOLID_C)
-ALL_H      := $(wildcard tests/model/ccx/*.h firmware/*.h firmware/*/*.h hal/*.h hal/*/*.h model/*/*.h host/*/*.h tests/*/*.h)
+BLIND_SCORE_C := $(wildcard tests/gap/blind/blind_score*.c)
+BLIND_MAIN := tests/gap/blind/blind_generate.c
+BLIND_C    := $(filter-out $(BLIND_SCORE_C) $(BLIND_MAIN),$(wildcard tests/gap/blind/blind_*.c))
+ALL_C      := $(FIRMWARE_C) $(SIM_C) $(MODEL_C) $(TABLES_CLI_C) $(HOST_C) $(HOST_MAIN) $(TEST_C) $(BENCH_C) $(SUPPORT_C) $(SOLID_C) $(BLIND_C) $(BLIND_MAIN) $(BLIND_SCORE_C)
+ALL_H      := $(wildcard tests/gap/blind/*.h tests/model/ccx/*.h firmware/*.h firmware/*/*.h hal/*.h hal/*/*.h model/*/*.h host/*/*.h tests/*/*.h)
 
 # --- flags
 WARNINGS := -Wall -Wextra -Wpedantic -Wconversion -Wsign-conversion -Wshadow -Werror
@@ -45,6 +48,7 @@ SUPPORT_O  := $(call object,$(SUPPORT_C))
 
 PROGRAMS := $(BUILD)/tribend-tables $(BUILD)/tribend
 TEST_PROGRAMS  := $(patsubst %.c,$(BUILD)/%,$(TEST_C))
+BLIND_PROGRAMS := $(BUILD)/tests/gap/blind/blind_generate $(BUILD)/tests/gap/blind/blind_score
 BENCH_PROGRAMS := $(patsubst %.c,$(BUILD)/%,$(BENCH_C))
 
 HOST_LIBS  := -ljansson -lcyaml -lyaml -fopenmp -lm
@@ -74,7 +78,7 @@ $(BUILD)/tribend: $(call object,$(HOST_MAIN)) $(HOST_O) $(SIM_O) $(FIRMWARE_O) $
 	$(link) $(HOST_LIBS)
 
 .PHONY: test-programs bench-programs
-test-programs: $(TEST_PROGRAMS)
+test-programs: $(TEST_PROGRAMS) $(BLIND_PROGRAMS)
 bench-programs: $(BENCH_PROGRAMS)
 
 # Tests of the model link its libraries; the others link what `tribend` links.
@@ -83,6 +87,12 @@ $(BUILD)/tests/model/test_%: $(BUILD)/tests/model/test_%.o $(SUPPORT_O) $(MODEL_
 $(BUILD)/tests/model/test_solid $(BUILD)/tests/bench/bench_solid: $(call object,$(SOLID_C))
 $(BUILD)/tests/bench/bench_model $(BUILD)/tests/bench/bench_solid: %: %.o $(MODEL_O) $(FIRMWARE_O)
 	$(link) $(MODEL_LIBS)
+# The blind generator has nothing of the simulator in it, the scorer nothing of anything.
+$(BUILD)/tests/gap/blind/blind_generate: $(call object,$(BLIND_MAIN) $(BLIND_C)) $(FIRMWARE_O)
+	$(link) -ljansson -lm
+$(BUILD)/tests/gap/blind/blind_score: $(call object,$(BLIND_SCORE_C))
+	$(link) -ljansson -lm
+$(BUILD)/tests/gap/test_blind_plant: $(call object,$(filter-out %/blind_truth.c,$(BLIND_C)))
 $(BUILD)/tests/%: $(BUILD)/tests/%.o $(SUPPORT_O) $(HOST_O) $(SIM_O) $(FIRMWARE_O) $(SHARED_O)
 	$(link) -lcmocka $(HOST_LIBS)
 

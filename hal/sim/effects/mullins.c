@@ -5,6 +5,12 @@
 
 #include "sim/effect.h"
 
+/* Form 1: whatever its load, a wall is softer by a power 1 / `scale` of the greatest load that it has borne: damage that
+ * stays (Chaboche 1988 has such a law for damage). */
+enum { RELOADING, LASTING };
+#define SOFTENING_MOST 0.8
+#define GREATEST_SHARE 1.5 /* of the working pressure: beyond, no more damage */
+
 enum { SOFTENING, SCALE };
 enum { GREATEST };
 
@@ -15,9 +21,12 @@ static void soften(double *state, const double *parameter, struct effect_signals
         *greatest = fmax(*greatest, *load);
         if (*greatest > 0.0) {
             const double share = fmax(*load / *greatest, 0.0);
+            const double working = fmin(*greatest / (scale_pa / parameter[SCALE]), GREATEST_SHARE);
             const double softer =
-                parameter[SOFTENING] * (1.0 - exp(-*greatest / scale_pa)) * (1.0 - share * share);
-            *load /= 1.0 - softer;
+                signals->form == LASTING
+                    ? parameter[SOFTENING] * pow(working, 1.0 / parameter[SCALE])
+                    : parameter[SOFTENING] * (1.0 - exp(-*greatest / scale_pa)) * (1.0 - share * share);
+            *load /= 1.0 - fmin(softer, SOFTENING_MOST);
         }
     }
 }
@@ -29,7 +38,9 @@ static const struct effect_kind mullins = {
                  "too much, in loading and unloading alike and at any rate, most at middle loads. Cycles "
                  "of growing height tell it from hysteresis",
     .stage = EFFECT_STAGE_BODY,
-    .scope = EFFECT_GLOBAL,
+    .scope = EFFECT_EVERY_CHAMBER,
+    .forms = 2,
+    .form_what = {"softer below the greatest past load only", "softer for good, by the greatest past load"},
     .parameter_count = 2,
     .parameter = {[SOFTENING] = {"softening", "1", 0.0, 0.5, 0.15, 0.0},
                   [SCALE] = {"scale", "1", 0.05, 2.0, 0.5, NAN}},

@@ -31,7 +31,7 @@ struct corpus {
 /* A random order of 0 .. count - 1 that is another in every round. */
 static size_t shuffled(uint64_t seed, const char *purpose, size_t count, size_t index) {
     struct blind_random random;
-    size_t order[64];
+    size_t order[64] = {0};
     blind_random_open(&random, seed, purpose, index / count);
     for (size_t i = 0; i < count; i++) {
         const size_t j = blind_below(&random, i + 1);
@@ -359,7 +359,7 @@ static void note_amounts(struct blind_case *blind) {
 
 static void name_case(struct blind_case *blind, uint64_t seed, size_t index) {
     struct blind_random random;
-    blind_random_open(&random, seed ^ 0x9d11d2e9u, blind->corpus, index);
+    blind_random_open(&random, seed ^ 0x51ed270bu, blind->corpus, index);
     (void)snprintf(blind->id, sizeof blind->id, "%08x", blind_random_u32(&random));
 }
 

@@ -29,7 +29,7 @@ static void gas_temperature_ports(struct blind_effect *effect, const struct blin
 static void pressed_valve_draw(struct blind_effect *effect, struct blind_random *random,
                                const struct blind_scene *scene) {
     NO_SCENE;
-    effect->parameter[0] = blind_uniform(random, 0.8e-3, 3e-3); /* s at 10 kPa */
+    effect->parameter[0] = blind_uniform(random, 0.4e-3, 2.5e-3); /* s at 10 kPa */
     effect->form[0] = blind_uniform(random, -0.8, 0.2);         /* of the closing, over that of the opening */
 }
 

@@ -109,7 +109,7 @@ static double rubber_area_m2(struct blind_plant *plant) {
 }
 
 static void look_up_body(struct blind_plant *plant) {
-    const double step_s = 1e-6 * (double)(plant->time_us - plant->body_us);
+    const double step_s = 1e-6 * (double)plant->tip_period_us;
     struct blind_shape *shape = &plant->shape;
     *shape = (struct blind_shape){.stretch = 1.0, .active_share = 1.0};
     true_pressures(plant, plant->load_pa);
@@ -133,7 +133,6 @@ static void look_up_body(struct blind_plant *plant) {
     for (size_t c = 0; c < 3; c++) {
         plant->load_most_pa = fmax(plant->load_most_pa, plant->load_pa[c]);
     }
-    plant->body_us = plant->time_us;
 }
 
 static int64_t next_tip_us(const struct blind_plant *plant) {

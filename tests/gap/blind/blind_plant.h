@@ -104,7 +104,6 @@ struct blind_plant {
     int64_t tip_age_us;    /* of a sample when it arrives */
     int64_t tip_latency_us; /* by which it is older than it claims */
     int64_t tip_next;      /* number of the next sample */
-    int64_t body_us;       /* when the body was looked up last */
     double load_pa[3];     /* the pressures that bend */
     struct blind_shape shape;
     struct blind_pose pose;

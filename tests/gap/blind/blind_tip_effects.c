@@ -105,7 +105,7 @@ static void quadratic(const struct blind_effect *effect, const double at[3], dou
 
 static void tip_distortion_pose(struct blind_effect *effect, const struct blind_plant *plant, double step_s,
                                 struct blind_pose *pose) {
-    double bias[3], rotation[3], turn[4];
+    double bias[3] = {0.0, 0.0, 0.0}, rotation[3], turn[4];
     (void)step_s;
     (effect->variant == 0 ? dipole : quadratic)(effect, pose->position_m, bias);
     for (int d = 0; d < 3; d++) {
