@@ -3,6 +3,7 @@
 #   BUILD=dir     put everything that is built into dir (default build, or build-sanitize)
 #   SANITIZE=1    build with the address and undefined-behaviour sanitizers
 #   CC=clang      another compiler
+#   EXTRA_EFFECTS=FILE.c   effects of your own, built into simulator and diagnosis
 
 SANITIZE ?= 0
 BUILD    ?= $(if $(filter 1,$(SANITIZE)),build-sanitize,build)
@@ -13,7 +14,7 @@ SHELL    := /bin/bash
 MAKEFLAGS += --no-builtin-rules
 include tests/tools/build.mk
 
-.PHONY: help setup all demo test bench lint format tables clean
+.PHONY: help setup all demo test bench gap-check lint format tables clean
 
 help: ## list these targets
 	@grep -hE '^[a-z-]+:.*## ' Makefile | awk -F ':.*## ' '{printf "  make %-10s %s\n", $$1, $$2}'
@@ -34,6 +35,10 @@ test: setup ## build and run every test (sets up what is missing first)
 bench: setup ## time an equilibrium, a table and the simulation on this machine
 	@$(MAKE) --no-print-directory -j$(JOBS) all bench-programs
 	@tests/tools/bench $(BUILD)
+
+gap-check: setup ## blind check of the diagnosis: data of another plant, truth withheld (FULL=1: four times as many)
+	@$(MAKE) --no-print-directory -j$(JOBS) all test-programs
+	@tests/gap/blind/gap_check
 
 lint: ## warnings as errors with gcc, clang and the ARM compiler; cppcheck; clang-tidy
 	@tests/tools/setup $(BUILD_PACKAGES) $(LINT_PACKAGES)

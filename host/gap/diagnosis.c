@@ -56,11 +56,11 @@ struct model_view {
 };
 
 static bool view_open(struct model_view *view, size_t residuals, size_t chunks) {
-    view->residual = calloc(residuals, sizeof(double));
+    view->residual = calloc(residuals + 1, sizeof(double));
     view->chunks.count = chunks;
-    view->chunks.square = calloc(chunks, sizeof(double));
-    view->chunks.noise = calloc(chunks, sizeof(double));
-    view->chunks.residual = calloc(chunks, sizeof(double));
+    view->chunks.square = calloc(chunks + 1, sizeof(double));
+    view->chunks.noise = calloc(chunks + 1, sizeof(double));
+    view->chunks.residual = calloc(chunks + 1, sizeof(double));
     return view->residual != NULL && view->chunks.square != NULL && view->chunks.noise != NULL &&
            view->chunks.residual != NULL;
 }
@@ -398,7 +398,8 @@ static void take_effects(struct diagnosis *diagnosis, const struct search *searc
     diagnosis->supply_scale = interval_of(search, 1, model->supply_scale, 5e-4);
     for (size_t e = 0; e < model->count; e++) {
         const struct effect *effect = &model->effect[e];
-        struct diagnosis_effect part, *out = gap_model_is_part(model, e) ? &part : &diagnosis->effect[diagnosis->effects++];
+        struct diagnosis_effect part = {.kind = effect->kind};
+        struct diagnosis_effect *out = gap_model_is_part(model, e) ? &part : &diagnosis->effect[diagnosis->effects++];
         *out = (struct diagnosis_effect){.kind = effect->kind,
                                          .form = effect->form,
                                          .place = e,

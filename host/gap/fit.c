@@ -16,8 +16,11 @@ static bool acts_on_gas(const struct effect_kind *kind) {
 }
 
 static bool same_effect(const struct effect *a, const struct effect *b) {
-    return a->kind == b->kind && a->chamber == b->chamber && a->onset_s == b->onset_s &&
-           memcmp(a->parameter, b->parameter, sizeof a->parameter) == 0;
+    bool same = a->kind == b->kind && a->chamber == b->chamber && a->form == b->form && a->onset_s == b->onset_s;
+    for (size_t i = 0; same && i < a->kind->parameter_count; i++) {
+        same = a->parameter[i] == b->parameter[i];
+    }
+    return same;
 }
 
 /* The next effect from `from` on that acts on the gas; `count`: none. */

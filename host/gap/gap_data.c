@@ -46,8 +46,14 @@ static bool fill1(const struct run_log *log, const char *name, double *to) {
 }
 
 static bool is_repeat(const struct gap_tip *a, const struct gap_tip *b) {
-    return memcmp(a->position_m, b->position_m, sizeof a->position_m) == 0 &&
-           (isnan(a->quaternion[0]) || memcmp(a->quaternion, b->quaternion, sizeof a->quaternion) == 0);
+    bool same = true;
+    for (size_t k = 0; k < 3; k++) {
+        same = same && a->position_m[k] == b->position_m[k];
+    }
+    for (size_t k = 0; k < 4 && !isnan(a->quaternion[0]); k++) {
+        same = same && a->quaternion[k] == b->quaternion[k];
+    }
+    return same;
 }
 
 static bool take_tip(struct gap_run *run, const struct run_log *log, size_t row, const int column[8]) {

@@ -5,7 +5,7 @@
 #include <string.h>
 
 #define STEP_US REPLAY_STEP_US
-#define PRESSURE_BLOCK_STEPS ((size_t)(REPLAY_PRESSURE_BLOCK_S * 1e6 + 0.5) / STEP_US)
+#define PRESSURE_BLOCK_STEPS ((size_t)(REPLAY_PRESSURE_BLOCK_S * 1e6 / STEP_US + 0.5))
 #define TIP_BLOCK_S REPLAY_TIP_BLOCK_S
 #define HELD_OUT_S 2.5          /* lengths of the blocks that are kept from the fit, every other one */
 #define SUPPLY_SPREAD_PA 60.0   /* of a block: how well a supply reading says what the valves feel */
@@ -356,7 +356,8 @@ static double between(const double *value, size_t stride, size_t count, double p
 
 /* Block of the level at a time in steps: levels stand for their block's middle. */
 static double block_position(double step) {
-    return step / (double)PRESSURE_BLOCK_STEPS - 0.5;
+    const double steps = (double)(PRESSURE_BLOCK_STEPS);
+    return step / steps - 0.5;
 }
 
 /* Sensors beside pressures that are known at the end of each step: sums of differences into the walk. */

@@ -18,6 +18,7 @@
 #define REPEATS_CERTAIN 0.08  /* share of repeated samples that no noise makes */
 #define REPEATS_LEAST 0.02    /* share of repeated samples below which none is frozen */
 #define ONSETS 12
+#define ONSET_FINE_S 0.15     /* an onset is not sought closer than that */
 #define COMPLETING_SHARE 0.5  /* of what is left, that a further effect must explain */
 #define POLISH_SHARE 0.002    /* of the gap: less than that is left by any form of the right effect */
 #define STRUCTURE_LEAST 0.3   /* mean square in units of a block's noise that is worth explaining */
@@ -189,6 +190,7 @@ static void crew_close(struct crew *crew) {
         fitter_close(&crew->fitter[i]);
     }
     free(crew->fitter);
+    *crew = (struct crew){NULL, 0};
 }
 
 static bool crew_open(struct crew *crew, const struct search *search, const struct fit_base *base) {
@@ -268,7 +270,7 @@ static void shortlist(struct search *search, struct crew *crew, const struct can
         const struct effect_kind *kind = list[i].kind;
         size_t above = 0, own_above = 0;
         for (size_t j = 0; j < count; j++) {
-            const bool more = gain[j] > gain[i] || (gain[j] == gain[i] && j < i);
+            const bool more = gain[j] > gain[i] || (j < i && gain[j] == gain[i]);
             above += more;
             own_above += more && list[j].kind == kind;
         }
@@ -300,7 +302,7 @@ static size_t screen_all(struct search *search, struct crew *crew, const struct 
             order[kept++] = &fits[i];
         }
     }
-    qsort(order, kept, sizeof *order, by_held_out);
+    qsort(order, kept, sizeof *order, by_held_out); // NOLINT(bugprone-sizeof-expression): pointers are sorted
     return kept;
 }
 
@@ -311,7 +313,7 @@ static void refine(struct search *search, struct crew *crew, struct fit **order,
             fitter_run(&crew->fitter[omp_get_thread_num()], order[i], REFINE_ROUNDS, true);
         }
     }
-    qsort(order, count, sizeof *order, by_held_out);
+    qsort(order, count, sizeof *order, by_held_out); // NOLINT(bugprone-sizeof-expression): pointers are sorted
     for (size_t i = 0; i < count && search->trials < SEARCH_TRIED_MAX; i++) {
         search->trial[search->trials++] = (struct search_trial){*order[i], step};
     }
@@ -404,7 +406,8 @@ static void find_onsets(struct search *search, struct crew *crew, struct fit *fi
             trial[k].model.effect[e].onset_s = end_s * (double)(k + 1) / (ONSETS + 1.0);
             fitter_run(&crew->fitter[omp_get_thread_num()], &trial[k], 2, true);
         }
-        for (double width_s = end_s / (ONSETS + 1.0); width_s > 0.15; width_s *= 0.4) {
+        double width_s = end_s / (ONSETS + 1.0);
+        while (width_s > ONSET_FINE_S) {
             size_t best = 0;
             for (size_t k = 1; k < ONSETS; k++) {
                 best = held_out(&trial[k]) < held_out(&trial[best]) ? k : best;
@@ -427,6 +430,7 @@ static void find_onsets(struct search *search, struct crew *crew, struct fit *fi
                     *fit = trial[k];
                 }
             }
+            width_s *= 0.4;
         }
     }
 }

@@ -8,7 +8,8 @@ LINT_PACKAGES  := clang clang-tidy cppcheck gcc-arm-none-eabi libnewlib-arm-none
 
 # --- sources: a folder is a layer; arrows between layers are include paths below
 FIRMWARE_C := $(wildcard firmware/*.c firmware/*/*.c)
-SIM_C      := $(wildcard hal/sim/*.c hal/sim/effects/*.c)
+# EXTRA_EFFECTS=FILE.c: effects of one's own, from anywhere, built into the simulator and the diagnosis
+SIM_C      := $(wildcard hal/sim/*.c hal/sim/effects/*.c) $(EXTRA_EFFECTS)
 MODEL_C    := $(filter-out model/cli/%,$(wildcard model/*/*.c))
 SHARED_C    := $(wildcard model/units/*.c model/program/*.c) model/description/yaml_file.c model/description/calibration_file.c
 TABLES_CLI_C := $(wildcard model/cli/*.c)
@@ -21,7 +22,7 @@ SOLID_C    := $(wildcard tests/model/ccx/*.c)
 BLIND_SCORE_C := $(wildcard tests/gap/blind/blind_score*.c)
 BLIND_MAIN := tests/gap/blind/blind_generate.c
 BLIND_C    := $(filter-out $(BLIND_SCORE_C) $(BLIND_MAIN),$(wildcard tests/gap/blind/blind_*.c))
-ALL_C      := $(FIRMWARE_C) $(SIM_C) $(MODEL_C) $(TABLES_CLI_C) $(HOST_C) $(HOST_MAIN) $(TEST_C) $(BENCH_C) $(SUPPORT_C) $(SOLID_C) $(BLIND_C) $(BLIND_MAIN) $(BLIND_SCORE_C)
+ALL_C      := $(wildcard docs/examples/*.c) $(FIRMWARE_C) $(SIM_C) $(MODEL_C) $(TABLES_CLI_C) $(HOST_C) $(HOST_MAIN) $(TEST_C) $(BENCH_C) $(SUPPORT_C) $(SOLID_C) $(BLIND_C) $(BLIND_MAIN) $(BLIND_SCORE_C)
 ALL_H      := $(wildcard tests/gap/blind/*.h tests/model/ccx/*.h firmware/*.h firmware/*/*.h hal/*.h hal/*/*.h model/*/*.h host/*/*.h tests/*/*.h)
 
 # --- flags
