@@ -223,6 +223,70 @@ static void physical_floor(const struct replay *replay, const double *residual, 
     }
 }
 
+/* Structure of one series: mean square less half the mean square of neighbours' differences; and its correlation after half a
+ * second, which says how long the unknown remembers. */
+struct series_structure {
+    double structure;
+    double remembered;
+};
+
+static struct series_structure structure_of(const struct replay *replay, const struct series *series,
+                                            const double *residual) {
+    const size_t lag = (size_t)(0.5 / series->block_s);
+    double square = 0.0, step2 = 0.0, product = 0.0, count = 0.0, pairs = 0.0, lagged = 0.0;
+    for (size_t b = 0; b < series->count; b++) {
+        const size_t at = series->start + b * series->stride;
+        if (!(replay->weight[at] > 0.0)) {
+            continue;
+        }
+        square += residual[at] * residual[at];
+        count += 1.0;
+        if (b > 0 && replay->weight[at - series->stride] > 0.0) {
+            step2 += 0.5 * pow(residual[at] - residual[at - series->stride], 2.0);
+            pairs += 1.0;
+        }
+        if (b >= lag && replay->weight[at - lag * series->stride] > 0.0) {
+            product += residual[at] * residual[at - lag * series->stride];
+            lagged += 1.0;
+        }
+    }
+    struct series_structure out = {0.0, 0.0};
+    if (count > 0.0 && pairs > 0.0 && lagged > 0.0) {
+        out.structure = fmax(square / count - step2 / pairs, 0.0);
+        out.remembered = square > 0.0 ? product / lagged / (square / count) : 0.0;
+    }
+    return out;
+}
+
+/* What the best model leaves: where it is, in which chambers, how long it lasts. */
+static void describe_rest(struct diagnosis *diagnosis, const struct replay *replay, const double *residual) {
+    double pressure[3] = {0.0}, position = 0.0, angle = 0.0, remembered = 0.0, all = 1e-12;
+    for (size_t i = 0; i < replay->runs; i++) {
+        struct series series[10];
+        const size_t count = list_series(replay, i, 0, series);
+        for (size_t s = 0; s < count; s++) {
+            const struct series_structure part = structure_of(replay, &series[s], residual);
+            *(s < 3 ? &pressure[s] : s < 7 ? &position : &angle) += s == 3 ? 0.0 : part.structure;
+            remembered += s == 3 ? 0.0 : part.structure * part.remembered;
+            all += s == 3 ? 0.0 : part.structure;
+        }
+    }
+    const double most = fmax(fmax(pressure[0], pressure[1]), pressure[2]);
+    const double upstream = pressure[0] + pressure[1] + pressure[2];
+    diagnosis->rest_stage = upstream > position + angle ? "valve" : angle < 0.2 * position ? "tip sensor" : "body";
+    for (size_t c = 0; c < 3; c++) {
+        diagnosis->rest_chamber[c] = upstream <= position + angle || pressure[c] > 0.3 * most;
+    }
+    const double kept = remembered / all;
+    (void)snprintf(diagnosis->description, sizeof diagnosis->description,
+                   "left after the best of the catalogue: %.0f %% in the pressure readings, %.0f %% in the tip's position, %.0f %% in "
+                   "its orientation; %s",
+                   100.0 * upstream / all, 100.0 * position / all, 100.0 * angle / all,
+                   kept > 0.5   ? "it lasts for longer than half a second: slow or constant"
+                   : kept > 0.1 ? "it lasts for some tenths of a second"
+                                : "it comes and goes within half a second: fast or in jumps");
+}
+
 static bool measure_gaps(struct diagnosis *diagnosis, struct search *search) {
     static const char *const names[DIAGNOSIS_RESIDUALS] = {"r1_pressure", "r2_position", "r2_angle", "r3_position", "r3_angle"};
     static const char *const units[DIAGNOSIS_RESIDUALS] = {"kPa", "mm", "deg", "mm", "deg"};
@@ -246,6 +310,7 @@ static bool measure_gaps(struct diagnosis *diagnosis, struct search *search) {
             *figure(&diagnosis->gap[k], m) = rms[k];
         }
         if (m == 2) {
+            describe_rest(diagnosis, replay, view[m].residual);
             physical_floor(replay, view[m].residual, floor_of);
             for (size_t k = 0; k < DIAGNOSIS_RESIDUALS; k++) {
                 diagnosis->gap[k].floor = floor_of[k < 3 ? k : k - 2];
@@ -524,6 +589,33 @@ static void describe_data(struct diagnosis *diagnosis, const struct search *sear
     }
 }
 
+static bool in_group(const struct diagnosis *diagnosis, const char *name) {
+    for (size_t i = 0; i < diagnosis->group; i++) {
+        if (strcmp(diagnosis->group_name[i], name) == 0) {
+            return true;
+        }
+    }
+    return false;
+}
+
+/* What to record next, in words. */
+static void suggest(struct diagnosis *diagnosis) {
+    const char *what = "";
+    if (diagnosis->verdict == GAP_UNKNOWN) {
+        what = "hold, step and cycle one chamber at a time at three heights: what the rest depends on then shows in the HTML report";
+    } else if (in_group(diagnosis, "gravity") || in_group(diagnosis, "tip_payload")) {
+        what = "bend by the same angle in six directions, and again with the module mounted the other way up";
+    } else if (in_group(diagnosis, "creep") || in_group(diagnosis, "hysteresis") || in_group(diagnosis, "tip_latency")) {
+        what = "the same cycle at three speeds, then hold for a minute: creep depends on time, hysteresis on the path, latency on speed";
+    } else if (in_group(diagnosis, "line_volume") || in_group(diagnosis, "line_resistance") ||
+               in_group(diagnosis, "valve_sluggish")) {
+        what = "full steps from rest of one chamber at a time, up and down: small volumes tell a volume from a resistance";
+    } else if (diagnosis->group > 1) {
+        what = "all three chambers, one at a time and together, with steps, slow ramps and rests in between";
+    }
+    (void)snprintf(diagnosis->next_experiment, sizeof diagnosis->next_experiment, "%s", what);
+}
+
 bool diagnosis_conclude(struct diagnosis *diagnosis, struct search *search) {
     memset(diagnosis, 0, sizeof *diagnosis);
     if (!measure_gaps(diagnosis, search)) {
@@ -534,5 +626,13 @@ bool diagnosis_conclude(struct diagnosis *diagnosis, struct search *search) {
     believe(diagnosis, search);
     locate(diagnosis);
     decide(diagnosis, search);
+    if (diagnosis->verdict == GAP_UNKNOWN) {
+        diagnosis->stage = diagnosis->rest_stage;
+        memcpy(diagnosis->chamber, diagnosis->rest_chamber, sizeof diagnosis->chamber);
+        (void)snprintf(diagnosis->regime, sizeof diagnosis->regime, "whole run");
+    } else {
+        *diagnosis->description = '\0';
+    }
+    suggest(diagnosis);
     return true;
 }

@@ -63,6 +63,8 @@ struct diagnosis {
     struct diagnosis_interval closed;                /* share of the gap closed by everything */
     struct diagnosis_interval closed_recalibration;  /* by recalibration alone */
     double structure[3];    /* share of noise floor squared that is left: nominal, recalibrated, best */
+    const char *rest_stage; /* where the best model leaves most */
+    bool rest_chamber[3];
     char description[DIAGNOSIS_TEXT_BYTES];          /* of an unknown gap */
     char next_experiment[DIAGNOSIS_TEXT_BYTES];
     size_t warnings;
