@@ -23,6 +23,7 @@ int cli_effects(int argc, char **argv) {
     const struct argp parser = {NULL, NULL, NULL,
                                 "List the effects that --effect adds to the simulated module and that `tribend gap` looks for.",
                                 NULL, NULL, NULL};
+    argp_err_exit_status = EXIT_USAGE;
     if (argp_parse(&parser, argc, argv, 0, NULL, NULL) != 0) {
         return EXIT_USAGE;
     }

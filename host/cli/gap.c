@@ -157,6 +157,7 @@ static int run_diagnose(int argc, char **argv) {
     static struct gap_data data;
     struct table_file file;
     char error[PROGRAM_ERROR_BYTES], found[PROGRAM_PATH_BYTES];
+    argp_err_exit_status = EXIT_USAGE;
     if (argp_parse(&parser, argc, argv, 0, NULL, &arguments) != 0) {
         return EXIT_USAGE;
     }

@@ -22,6 +22,7 @@
 #define GROUP_LEAST 0.15 /* belief that puts a name into the group */
 #define SLUGGISH_SHARE 0.7
 #define SURE 0.60        /* belief above which one name is the verdict */
+#define MOVES_LEAST_PA 1500.0 /* a recording in which no pressure moves by more says nothing */
 #define CHUNK_S 2.5      /* of the bootstrap */
 #define RESAMPLES 400
 
@@ -547,8 +548,36 @@ static void locate(struct diagnosis *diagnosis) {
 
 /* --- verdict --- */
 
+/* Held pressures that never move tell stiffness from nothing. */
+static bool says_nothing(struct diagnosis *diagnosis, const struct search *search) {
+    double moves_pa = 0.0;
+    for (size_t i = 0; i < search->data->runs; i++) {
+        const struct gap_run *run = &search->data->run[i];
+        const double *value = run->has_reading ? run->reading_pa : run->command_pa;
+        for (size_t c = 0; c < 3; c++) {
+            double least = INFINITY, most = -INFINITY;
+            for (size_t row = 0; row < run->rows; row++) {
+                least = fmin(least, value[3 * row + c]); /* a NaN changes neither */
+                most = fmax(most, value[3 * row + c]);
+            }
+            moves_pa = fmax(moves_pa, most - least);
+        }
+    }
+    if (moves_pa > MOVES_LEAST_PA) {
+        return false;
+    }
+    diagnosis_warn(diagnosis, "the pressures never move by more than %.0f Pa: record steps, ramps and holds of all three chambers",
+                   moves_pa);
+    return true;
+}
+
 static void decide(struct diagnosis *diagnosis, const struct search *search) {
     const double before = diagnosis->structure[0], recalibrated = diagnosis->structure[1], best = diagnosis->structure[2];
+    if (says_nothing(diagnosis, search)) {
+        diagnosis->verdict = GAP_INSUFFICIENT_DATA;
+        diagnosis->effects = 0;
+        return;
+    }
     if (search->best.model.count == 0) {
         if (recalibrated > fmax(STRUCTURE_NONE, RECALIBRATED_SHARE * before)) {
             diagnosis->verdict = GAP_UNKNOWN;

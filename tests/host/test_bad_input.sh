@@ -146,6 +146,20 @@ else
     failed=$((failed + 1))
 fi
 
+# --- recordings for a diagnosis
+"$tribend" bend 40deg --for 3s -q --record "$scratch/good.csv" >/dev/null
+log() { # NAME AWK_STATEMENT: the good log with its rows changed
+    awk -F, "BEGIN { OFS = \",\" } /^#/ || /^time/ { print; next } { n++; $2; print }" "$scratch/good.csv" >"$scratch/$1.csv"
+    echo "$scratch/$1.csv"
+}
+expect log_in_bar 3 'looks like bar' "$tribend" gap diagnose -q "$(log bar 'for (i = 8; i <= 10; i++) $i = $i / 1e5')"
+expect log_in_millimetres 3 'looks like mm' "$tribend" gap diagnose -q "$(log mm 'for (i = 12; i <= 14; i++) if ($i != "") $i = $i * 1000')"
+expect log_with_nan 3 'nan.csv:[0-9]+: .*p2_pa' "$tribend" gap diagnose -q "$(log nan 'if (n == 50) $9 = "nan"')"
+expect log_backwards 3 'backwards.csv:[0-9]+: .*time_s' "$tribend" gap diagnose -q "$(log backwards 'if (n == 50) $1 = 0')"
+expect log_of_one_row 3 'one.csv' "$tribend" gap diagnose -q "$(log one 'if (n > 1) exit')"
+expect log_of_another_module 3 'is of module other' "$tribend" gap diagnose -q "$(sed 's/^# module: .*/# module: other/' "$scratch/good.csv" >"$scratch/other.csv"; echo "$scratch/other.csv")"
+expect effect_left_out_is_none 2 'no effect' "$tribend" gap diagnose -q --without nothing "$scratch/good.csv"
+
 # --- calibrations: test_calibration.c has the messages; here, that each program gives them
 cat >"$scratch/soft.yaml" <<'YAML'
 module: paper-semicircle
