@@ -6,6 +6,7 @@
 #include <string.h>
 
 #include "log/run_log.h"
+#include "safety/supervisor.h"
 
 #define TIP_AGE_S 0.010      /* a pose is this old in the row in which it arrives (nominal sensor) */
 #define UNIT_TOLERANCE 0.05  /* of a quaternion's length */
@@ -101,6 +102,21 @@ static void count_repeats(struct gap_run *run) {
     }
 }
 
+static bool is_driving(double state) {
+    return state == (double)SUPERVISOR_ACTIVE || state == (double)SUPERVISOR_HOLD;
+}
+
+/* Where the state says that control ends, no coil is left energised until its period ends. */
+static void find_cuts(struct gap_run *run, const struct run_log *log) {
+    const int column = run_log_column(log, "state");
+    bool driving = false;
+    for (size_t row = 0; row < run->rows; row++) {
+        const double state = cell(log, row, column);
+        run->cut[row] = driving && !isnan(state) && !is_driving(state);
+        driving = isnan(state) ? driving : is_driving(state);
+    }
+}
+
 static bool out_of_memory(struct gap_run *run, char *error, size_t error_bytes) {
     (void)snprintf(error, error_bytes, "%s: out of memory", run->path);
     return false;
@@ -121,8 +137,9 @@ static bool take_log(struct gap_run *run, const struct run_log *log, char *error
     run->supply_pa = malloc(log->rows * sizeof(double));
     run->temperature_k = malloc(log->rows * sizeof(double));
     run->tip = malloc(log->rows * sizeof *run->tip);
+    run->cut = calloc(log->rows, sizeof *run->cut);
     if (run->time_s == NULL || run->duty == NULL || run->reading_pa == NULL || run->command_pa == NULL ||
-        run->supply_pa == NULL || run->temperature_k == NULL || run->tip == NULL) {
+        run->supply_pa == NULL || run->temperature_k == NULL || run->tip == NULL || run->cut == NULL) {
         return out_of_memory(run, error, error_bytes);
     }
     const int time = run_log_column(log, "time_s");
@@ -141,6 +158,7 @@ static bool take_log(struct gap_run *run, const struct run_log *log, char *error
         run->tips += take_tip(run, log, row, tip_column);
     }
     count_repeats(run);
+    find_cuts(run, log);
     return true;
 }
 
@@ -231,6 +249,7 @@ void gap_data_free(struct gap_data *data) {
         free(run->supply_pa);
         free(run->temperature_k);
         free(run->tip);
+        free(run->cut);
     }
     memset(data, 0, sizeof *data);
 }

@@ -23,6 +23,7 @@ struct gap_run {
     double *duty;          /* [rows * 3]; holds from its row on */
     double *reading_pa;    /* [rows * 3]; NAN where not measured */
     double *command_pa;    /* [rows * 3] */
+    bool *cut;             /* [rows]; the controller de-energises all coils in this row, inside a period too */
     double *supply_pa;     /* [rows] */
     double *temperature_k; /* [rows] */
     bool has_duty;

@@ -316,6 +316,15 @@ static void duty_at(const struct replay_run *run, size_t *row, int64_t time_us, 
     }
 }
 
+/* Coils that the controller switches off within the step. */
+static void cut_valves(const struct replay_run *run, struct plant *plant, size_t *row, int64_t until_us) {
+    for (; *row < run->run->rows && llround(1e6 * run->run->time_s[*row]) < until_us; (*row)++) {
+        for (size_t c = 0; c < 3 && run->run->cut[*row]; c++) {
+            valve_cut(&plant->valve[c], &plant->parameters.valve, llround(1e6 * run->run->time_s[*row]));
+        }
+    }
+}
+
 static double temperature_at(const struct gap_run *data, size_t row) {
     return data->has_temperature && row < data->rows ? data->temperature_k[row] : NAN;
 }
@@ -324,7 +333,7 @@ static void simulate_run(const struct replay *replay, const struct gap_model *mo
                          struct row_walk *walk, double *pressure_pa) {
     const struct replay_run *run = &replay->run[index];
     const int64_t period_us = replay->nominal.valve.period_us;
-    size_t duty_row = 0;
+    size_t duty_row = 0, cut_row = 0;
     double before_pa[3];
     set_up_plant(replay, model, plant);
     chambers_set_pressure(&plant->chambers, &plant->parameters.gas, replay->table, run->initial_pa);
@@ -339,6 +348,7 @@ static void simulate_run(const struct replay *replay, const struct gap_model *mo
             plant->temperature_k = temperature_at(run->run, walk->row);
             plant_start_period(plant, from_us, duty);
         }
+        cut_valves(run, plant, &cut_row, from_us + STEP_US);
         plant_step(plant, true, from_us, from_us + STEP_US);
         memcpy(pressure_pa + 3 * step, plant->pressure_pa, sizeof plant->pressure_pa);
         meet_rows(walk, step, before_pa, plant->reading_pa, plant->influence.supply_pa);
