@@ -23,6 +23,7 @@
 #define SLUGGISH_SHARE 0.7
 #define SURE 0.60        /* belief above which one name is the verdict */
 #define MOVES_LEAST_PA 1500.0 /* a recording in which no pressure moves by more says nothing */
+#define FLOOR_DOUBTFUL 10.0    /* neighbours differ by that many times the sensor's noise */
 #define CHUNK_S 2.5      /* of the bootstrap */
 #define RESAMPLES 400
 
@@ -645,6 +646,23 @@ static void suggest(struct diagnosis *diagnosis) {
     (void)snprintf(diagnosis->next_experiment, sizeof diagnosis->next_experiment, "%s", what);
 }
 
+/* Where neighbours differ by far more than the sensor errs, something moved between them that was not recorded: what is called
+ * noise then hides a gap. */
+static void doubt_floor(struct diagnosis *diagnosis, const struct search *search) {
+    const double noise_deg = search->replay.run[0].tip_noise[1] * DEGREES;
+    const struct diagnosis_gap *angle = &diagnosis->gap[2];
+    if (!angle->measured || !(angle->floor > FLOOR_DOUBTFUL * noise_deg)) {
+        return;
+    }
+    diagnosis_warn(diagnosis,
+                   "neighbouring tip samples differ by %.2g deg beyond the model, the sensor errs by %.2g deg: transitions were cut "
+                   "out or sampled too slowly, and a gap smaller than that cannot be seen; record at 50 Hz or more without cuts",
+                   angle->floor, noise_deg);
+    if (diagnosis->verdict == GAP_NONE) {
+        diagnosis->verdict = GAP_INSUFFICIENT_DATA;
+    }
+}
+
 bool diagnosis_conclude(struct diagnosis *diagnosis, struct search *search) {
     memset(diagnosis, 0, sizeof *diagnosis);
     if (!measure_gaps(diagnosis, search)) {
@@ -662,6 +680,7 @@ bool diagnosis_conclude(struct diagnosis *diagnosis, struct search *search) {
     } else {
         *diagnosis->description = '\0';
     }
+    doubt_floor(diagnosis, search);
     suggest(diagnosis);
     return true;
 }

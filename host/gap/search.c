@@ -16,6 +16,7 @@
 #define GAIN_SHARE 0.03       /* an effect must take off this share of the held-out squares .. */
 #define GAIN_SIGMA 40.0       /* .. and so much that noise does not */
 #define REPEATS_CERTAIN 0.08  /* share of repeated samples that no noise makes */
+#define REPEATS_HELP 0.8      /* of the squares at most may be left once they count as repeats */
 #define REPEATS_LEAST 0.02    /* share of repeated samples below which none is frozen */
 #define ONSETS 12
 #define ONSET_FINE_S 0.15     /* an onset is not sought closer than that */
@@ -592,7 +593,7 @@ static bool take_repeats(struct search *search) {
     effect.parameter[0] = share;
     add_effect(&with.model, &effect);
     const bool sound = recalibrate(search, &with, true);
-    if (sound) {
+    if (sound && held_out(&with) < REPEATS_HELP * held_out(&search->recalibrated)) {
         search->best = with;
         search->trial[search->trials++] = (struct search_trial){with, 0};
     }
