@@ -19,6 +19,9 @@ int cli_record(int argc, char **argv);
 int cli_import(int argc, char **argv);
 int cli_gap(int argc, char **argv);
 int cli_effects(int argc, char **argv);
+int cli_run(int argc, char **argv);
+/* `tribend gap plan` */
+int gap_plan_run(int argc, char **argv);
 /* `tribend gap close` */
 int gap_close_run(int argc, char **argv);
 

@@ -185,6 +185,7 @@ static int run_diagnose(int argc, char **argv) {
 int cli_gap(int argc, char **argv) {
     static const struct program_subcommand subcommands[] = {
         {"diagnose", run_diagnose, "where the gap lies, which effect causes it, how far it shrinks"},
-        {"close", gap_close_run, "how far a calibration closes the gap in closed loop"}};
+        {"close", gap_close_run, "how far a calibration closes the gap in closed loop"},
+        {"plan", gap_plan_run, "which experiment tells the remaining candidates apart"}};
     return program_run(argv[0], subcommands, sizeof subcommands / sizeof subcommands[0], argc, argv);
 }

@@ -4,6 +4,7 @@
 static const struct program_subcommand subcommands[] = {
     {"bend", cli_bend, "bend the tip to an angle in a direction, in closed loop"},
     {"pressure", cli_pressure, "hold three chamber pressures"},
+    {"run", cli_run, "follow a plan of pressures, ramps, waves and bends"},
     {"status", cli_status, "say what the controller sees and which faults it has"},
     {"plot", cli_plot, "draw a recorded run"},
     {"record", cli_record, "write down what a controller does, without commanding it"},

@@ -5,33 +5,46 @@
 #include <string.h>
 
 #include "cli/commands.h"
+#include "cli/run_course.h"
 #include "log/run_log.h"
 #include "report/run_summary.h"
 
 #define DEGREES (180.0 / M_PI)
 #define READY_WITHIN_US 2000000
 #define REPEAT_US 100000
+#define CHANGE_US 10000 /* a command that changes is sent at most this often */
 #define PROGRESS_US 500000
 #define VENT_WITHIN_US 10000000
 #define VENTED_PA 500.0f
 #define WORDS_BYTES 512
+#define NOTE_BYTES 512
 
 struct run {
     const struct bus_options *options;
     struct bus *bus;
     struct run_log_writer *log; /* NULL: not recorded */
-    struct controller_command command;
+    struct controller_command command; /* sent last */
+    int64_t sent_us;
     int64_t next_send_us;
     int64_t next_progress_us;
     struct run_summary summary;
 };
 
-static bool send(struct run *run, enum controller_command_kind kind, int64_t time_us) {
-    if (time_us < run->next_send_us || sim_drill_silences_host(&run->options->drill, time_us)) {
+static bool is_same(const struct controller_command *a, const struct controller_command *b) {
+    return a->kind == b->kind && a->pressure_pa[0] == b->pressure_pa[0] &&
+           a->pressure_pa[1] == b->pressure_pa[1] && a->pressure_pa[2] == b->pressure_pa[2] &&
+           a->bend_rad == b->bend_rad && a->direction_rad == b->direction_rad &&
+           a->co_contraction_pa == b->co_contraction_pa;
+}
+
+static bool send(struct run *run, const struct controller_command *command, int64_t time_us) {
+    const bool changed = !is_same(command, &run->command) && time_us >= run->sent_us + CHANGE_US;
+    if ((time_us < run->next_send_us && !changed) || sim_drill_silences_host(&run->options->drill, time_us)) {
         return true;
     }
+    run->sent_us = time_us;
     run->next_send_us = time_us + REPEAT_US;
-    run->command.kind = kind;
+    run->command = *command;
     return run->bus->link.send(run->bus->link.context, &run->command);
 }
 
@@ -81,13 +94,16 @@ static int wait_ready(struct run *run, struct link_report *report) {
     return EXIT_OK;
 }
 
-static int follow(struct run *run, const struct controller_command *command, struct link_report *report) {
+static int follow(struct run *run, const struct run_course *course, struct link_report *report) {
     const int64_t start_us = report->time_us;
     const int64_t end_us = start_us + (int64_t)(1e6 * run->options->duration_s);
-    run->command = *command;
-    run_summary_start(&run->summary, command, start_us, end_us);
+    struct controller_command command;
+    course->command_at(course->context, 0.0, &command);
+    run->command = command;
+    run_summary_start(&run->summary, course->steady != NULL ? course->steady : &command, start_us, end_us);
     while (report->time_us < end_us && program_interrupted == 0) {
-        if (!send(run, command->kind, report->time_us) || !receive(run, report)) {
+        course->command_at(course->context, 1e-6 * (double)(report->time_us - start_us), &command);
+        if (!send(run, &command, report->time_us) || !receive(run, report)) {
             return program_fail(EXIT_OUTPUT, "the controller on bus %s went away", run->options->bus);
         }
         run_summary_add(&run->summary, report);
@@ -103,11 +119,12 @@ static int follow(struct run *run, const struct controller_command *command, str
 static bool vent(struct run *run, struct link_report *report) {
     const int64_t until_us = report->time_us + VENT_WITHIN_US;
     const float *pressure_pa = report->status.pressure_estimate_pa;
+    const struct controller_command command = {.kind = COMMAND_VENT};
     bool vented = false;
-    run->command = (struct controller_command){.kind = COMMAND_VENT};
+    run->command = command;
     run->next_send_us = report->time_us;
     while (!vented && report->time_us < until_us) {
-        if (!send(run, COMMAND_VENT, report->time_us) || !receive(run, report)) {
+        if (!send(run, &command, report->time_us) || !receive(run, report)) {
             return false;
         }
         vented = pressure_pa[0] < VENTED_PA && pressure_pa[1] < VENTED_PA && pressure_pa[2] < VENTED_PA;
@@ -115,9 +132,8 @@ static bool vent(struct run *run, struct link_report *report) {
     return vented;
 }
 
-static void print_summary(const struct run_summary *summary, const struct link_report *last) {
+static void print_followed(const struct run_summary *summary) {
     const struct controller_command *command = &summary->command;
-    char words[WORDS_BYTES];
     if (command->kind == COMMAND_BEND && summary->samples > 0) {
         const double n = (double)summary->samples;
         const double bend = DEGREES * summary->bend_sum_rad / n, turn = DEGREES * summary->direction_sum_rad / n;
@@ -145,6 +161,10 @@ static void print_summary(const struct run_summary *summary, const struct link_r
     } else {
         printf("settled   not within %s\n", band);
     }
+}
+
+static void print_health(const struct link_report *last) {
+    char words[WORDS_BYTES];
     cli_describe_warnings(last->status.warnings, words, sizeof words);
     printf("warnings  %s\n", words);
     printf("tip       %u samples, %u rejected, lost %u times; commands refused: %u\n", last->status.tip_samples,
@@ -166,12 +186,12 @@ static int explain_fault(const struct link_report *report) {
     return EXIT_FAULT;
 }
 
-static int run_on_bus(struct run *run, const struct controller_command *command) {
+static int run_on_bus(struct run *run, const struct run_course *course) {
     struct link_report report;
     memset(&report, 0, sizeof report);
     int code = wait_ready(run, &report);
     if (code == EXIT_OK) {
-        code = follow(run, command, &report);
+        code = follow(run, course, &report);
     }
     struct link_report last = report;
     const int64_t vent_us = report.time_us;
@@ -179,7 +199,10 @@ static int run_on_bus(struct run *run, const struct controller_command *command)
     if (code == EXIT_FAULT) {
         code = explain_fault(&last);
     } else if (code == EXIT_OK || code == EXIT_INTERRUPTED) {
-        print_summary(&run->summary, &last);
+        if (course->steady != NULL) {
+            print_followed(&run->summary);
+        }
+        print_health(&last);
     }
     if (code == EXIT_INTERRUPTED) {
         printf("interrupted at %.2f s\n", 1e-6 * (double)last.time_us);
@@ -195,16 +218,16 @@ static int run_on_bus(struct run *run, const struct controller_command *command)
     return code;
 }
 
-int run_command(const struct bus_options *options, const struct controller_command *command) {
+int run_course(const struct bus_options *options, const struct run_course *course) {
     static struct bus bus;
     struct run_log_writer log;
-    char error[PROGRAM_ERROR_BYTES], note[64];
+    char error[PROGRAM_ERROR_BYTES], note[NOTE_BYTES];
     int code = bus_open(&bus, options);
     if (code != EXIT_OK) {
         return code;
     }
     const struct bend_table_module *module = &bus.file.table.module;
-    (void)snprintf(note, sizeof note, "bus %s, seed %" PRIu64, options->bus, options->seed);
+    (void)snprintf(note, sizeof note, "%sbus %s, seed %" PRIu64, course->note, options->bus, options->seed);
     const struct run_log_metadata metadata = {.module = module->name,
                                               .table_hash = module->inputs_hash,
                                               .rate_hz = 1e6 / (double)CONTROLLER_STEP_US,
@@ -216,7 +239,7 @@ int run_command(const struct bus_options *options, const struct controller_comma
     printf("module    %s, table %s\n", module->name, bus.table_path);
     program_catch_interrupt();
     struct run run = {.options = options, .bus = &bus, .log = options->record != NULL ? &log : NULL};
-    code = run_on_bus(&run, command);
+    code = run_on_bus(&run, course);
     if (options->record != NULL && !run_log_finish(&log, error, sizeof error)) {
         code = program_fail(EXIT_OUTPUT, "%s", error);
     } else if (options->record != NULL) {
@@ -224,4 +247,15 @@ int run_command(const struct bus_options *options, const struct controller_comma
     }
     bus_close(&bus);
     return code;
+}
+
+static void same_at_all_times(const void *context, double since_s, struct controller_command *command) {
+    (void)since_s;
+    *command = *(const struct controller_command *)context;
+}
+
+int run_command(const struct bus_options *options, const struct controller_command *command) {
+    const struct run_course course = {
+        .context = command, .command_at = same_at_all_times, .steady = command, .note = ""};
+    return run_course(options, &course);
 }
