@@ -278,6 +278,28 @@ static size_t find_cell(const float *axis, size_t nodes, float pressure_pa) {
     return low;
 }
 
+/* Weights of the stencil's four nodes from those of value and slope at either end of the cell, and from the weights of
+ * those slopes: of a node inside the axis its neighbours' and its own, of an end the nearest three. */
+static void weigh_nodes(size_t cell, size_t n, const float basis[4], const float low[3], const float high[3],
+                        float weight[STENCIL]) {
+    if (cell == 0) {
+        weight[0] = basis[0] + basis[1] * low[0] + basis[3] * high[0];
+        weight[1] = basis[1] * low[1] + basis[2] + basis[3] * high[1];
+        weight[2] = basis[1] * low[2] + basis[3] * high[2];
+        weight[3] = 0.0f;
+    } else if (cell == n - 2) {
+        weight[0] = 0.0f;
+        weight[1] = basis[1] * low[0] + basis[3] * high[0];
+        weight[2] = basis[0] + basis[1] * low[1] + basis[3] * high[1];
+        weight[3] = basis[1] * low[2] + basis[2] + basis[3] * high[2];
+    } else {
+        weight[0] = basis[1] * low[0];
+        weight[1] = basis[0] + basis[1] * low[1] + basis[3] * high[0];
+        weight[2] = basis[1] * low[2] + basis[2] + basis[3] * high[1];
+        weight[3] = basis[3] * high[2];
+    }
+}
+
 static void locate_on_axis(const struct bend_table *table, size_t a, float pressure_pa,
                            struct bend_table_stencil *stencil) {
     const float *axis = table->axis_pa[a];
@@ -293,23 +315,14 @@ static void locate_on_axis(const struct bend_table *table, size_t a, float press
                             t * t * (3.0f - 2.0f * t), t * t * (t - 1.0f) * h};
     const float rate[4] = {6.0f * t * (t - 1.0f) / h, (1.0f - t) * (1.0f - 3.0f * t), 6.0f * t * (1.0f - t) / h,
                            t * (3.0f * t - 2.0f)};
-    float weight[STENCIL] = {0.0f, 0.0f, 0.0f, 0.0f}, derivative[STENCIL] = {0.0f, 0.0f, 0.0f, 0.0f};
-    for (size_t end = 0; end < 2; end++) {
-        const size_t node = cell + end;
-        const size_t j = node == 0 ? 0 : (node - 1 > n - 3 ? n - 3 : node - 1);
-        weight[node - first] += basis[2 * end];
-        derivative[node - first] += rate[2 * end];
-        for (size_t k = 0; k < 3; k++) {
-            weight[j - first + k] += basis[2 * end + 1] * table->slope[a][node][k];
-            derivative[j - first + k] += rate[2 * end + 1] * table->slope[a][node][k];
-        }
-    }
+    const float *low = table->slope[a][cell], *high = table->slope[a][cell + 1];
     stencil->first[a] = (uint32_t)first;
     stencil->cell[a] = (uint32_t)cell;
     stencil->clamped = stencil->clamped || clamped;
-    for (size_t k = 0; k < STENCIL; k++) {
-        stencil->weight[a][k] = weight[k];
-        stencil->derivative[a][k] = clamped ? 0.0f : derivative[k];
+    weigh_nodes(cell, n, basis, low, high, stencil->weight[a]);
+    weigh_nodes(cell, n, rate, low, high, stencil->derivative[a]);
+    for (size_t k = 0; clamped && k < STENCIL; k++) {
+        stencil->derivative[a][k] = 0.0f;
     }
 }
 

@@ -17,10 +17,12 @@ void body_shape_of(const struct bend_table *table, const struct chambers *chambe
 void body_shape_at(const struct bend_table *table, const double pressure_pa[3], struct body_shape *shape) {
     const double length_m = (double)table->module.active_length_m;
     struct table_point point;
+    double value[3], gradient[3][3];
     table_point_at(&point, table, pressure_pa);
-    shape->bend_x_rad = length_m * table_point_value(&point, BEND_TABLE_CURVATURE_X, NULL);
-    shape->bend_y_rad = length_m * table_point_value(&point, BEND_TABLE_CURVATURE_Y, NULL);
-    shape->stretch = table_point_value(&point, BEND_TABLE_STRETCH, NULL);
+    table_point_values(&point, BEND_TABLE_CURVATURE_X, value, gradient);
+    shape->bend_x_rad = length_m * value[0];
+    shape->bend_y_rad = length_m * value[1];
+    shape->stretch = value[2];
     shape->active_fraction = 1.0;
 }
 

@@ -26,6 +26,53 @@ double table_point_value(const struct table_point *point, enum bend_table_channe
     return value;
 }
 
+/* Four nodes along the last axis at once. */
+typedef float four __attribute__((vector_size(16)));
+
+static four load4(const float *from) {
+    four value;
+    memcpy(&value, from, sizeof value);
+    return value;
+}
+
+static double dot4(four a, four b) {
+    const four product = a * b;
+    return (double)((product[0] + product[1]) + (product[2] + product[3]));
+}
+
+void table_point_values(const struct table_point *point, enum bend_table_channel first, double value[3],
+                        double gradient[3][3]) {
+    const struct bend_table *table = point->table;
+    const struct bend_table_stencil *stencil = &point->stencil;
+    const size_t plane = (size_t)table->nodes[2] * table->nodes[1];
+    const size_t start = stencil->first[2] + table->nodes[2] * (size_t)stencil->first[1] + plane * stencil->first[0];
+    four sum[3] = {{0.0f}, {0.0f}, {0.0f}}, along0[3] = {{0.0f}, {0.0f}, {0.0f}}, along1[3] = {{0.0f}, {0.0f}, {0.0f}};
+    for (size_t i = 0; i < 4; i++) {
+        four line[3] = {{0.0f}, {0.0f}, {0.0f}};
+        for (size_t j = 0; j < 4; j++) {
+            const size_t at = start + plane * i + table->nodes[2] * j;
+            for (size_t c = 0; c < 3; c++) {
+                const four row = load4(table->channel[(size_t)first + c] + at);
+                line[c] += stencil->weight[1][j] * row;
+                along1[c] += stencil->weight[0][i] * stencil->derivative[1][j] * row;
+            }
+        }
+        for (size_t c = 0; c < 3; c++) {
+            sum[c] += stencil->weight[0][i] * line[c];
+            along0[c] += stencil->derivative[0][i] * line[c];
+        }
+    }
+    const four weight = load4(stencil->weight[2]), derivative = load4(stencil->derivative[2]);
+    for (size_t c = 0; c < 3; c++) {
+        const double slope[3] = {dot4(along0[c], weight), dot4(along1[c], weight), dot4(sum[c], derivative)};
+        value[c] = dot4(sum[c], weight);
+        for (size_t a = 0; a < 3; a++) {
+            value[c] += slope[a] * point->beyond_pa[a];
+            gradient[c][a] = slope[a];
+        }
+    }
+}
+
 double gas_mass_flow(const struct gas_parameters *parameters, double conductance, double up_pa_abs,
                      double down_pa_abs) {
     if (!(up_pa_abs > down_pa_abs)) {
@@ -36,10 +83,6 @@ double gas_mass_flow(const struct gas_parameters *parameters, double conductance
                           sqrt(293.15 / parameters->temperature_k);
     const double share = (ratio - b) / (1.0 - b);
     return ratio <= b ? choked : choked * sqrt(1.0 - share * share);
-}
-
-static enum bend_table_channel volume_channel(size_t chamber) {
-    return (enum bend_table_channel)((size_t)BEND_TABLE_VOLUME_1 + chamber);
 }
 
 /* The state in the grid that knows it, whose first axis is chamber `first` (0 where none has ballooned). */
@@ -60,12 +103,14 @@ static void look_up(struct chambers *chambers, const struct gas_parameters *para
                     const struct bend_table *table) {
     const double length_m = (double)table->module.chamber_length_m, scale = chambers->stiffness_scale;
     struct table_point point;
+    double values[3], gradients[3][3];
     const size_t first = point_of(chambers, table, &point);
+    table_point_values(&point, BEND_TABLE_VOLUME_1, values, gradients);
     for (size_t a = 0; a < 3; a++) {
         const size_t c = (first + a) % 3;
         const bool by_volume = c == chambers->ballooned;
-        double gradient[3];
-        const double value = table_point_value(&point, volume_channel(a), gradient);
+        double *const gradient = gradients[a];
+        const double value = values[a];
         for (size_t d = 0; d < 3; d++) {
             gradient[d] *= by_volume ? scale : 1.0;
             gradient[d] /= (first + d) % 3 == chambers->ballooned ? 1.0 : scale;

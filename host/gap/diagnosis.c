@@ -97,7 +97,7 @@ static size_t list_series(const struct replay *replay, size_t index, size_t firs
 }
 
 static size_t chunks_of(const struct replay_run *run) {
-    return (size_t)(1e-6 * REPLAY_STEP_US * (double)run->steps / CHUNK_S) + 2;
+    return (size_t)(REPLAY_PRESSURE_BLOCK_S * (double)run->blocks / CHUNK_S) + 2;
 }
 
 /* Of neighbours both held out, half the squared difference is noise. */

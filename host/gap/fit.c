@@ -77,12 +77,49 @@ static void difference_of(const struct replay *replay, const struct replay_state
     }
 }
 
-bool fit_base_open(struct fit_base *base, const struct replay *replay, const struct gap_model *model) {
+/* Residuals of the base's own model, from its pressures in `state`. */
+static void base_residual(const struct replay *replay, const struct gap_model *model, const struct replay_state *state,
+                          double *residual) {
+    replay_take_pressures(replay, state, residual);
+    replay_tip(replay, model, state, false, residual);
+}
+
+/* offset = fine less coarse. */
+static bool find_offsets(struct fit_base *base, const struct replay *fine) {
+    const size_t all = base->replay->residuals;
+    struct replay_state state;
+    struct replay samples = *base->replay; /* coarse in time, with every tip sample */
+    samples.coarse = false;
+    base->offset[0] = malloc(2 * all * sizeof(double));
+    bool sound = replay_state_open(&state, fine) && base->offset[0] != NULL;
+    double *coarse = malloc(all * sizeof *coarse);
+    if (sound && coarse != NULL) {
+        base->offset[1] = base->offset[0] + all;
+        replay_pressures(fine, &base->model, &state);
+        base_residual(fine, &base->model, &state, base->offset[0]);
+        memcpy(base->offset[1], base->offset[0], all * sizeof(double));
+        for (size_t i = 0; i < 2; i++) {
+            base_residual(i == 0 ? &samples : base->replay, &base->model, &base->state, coarse);
+            for (size_t k = 0; k < all; k++) {
+                base->offset[i][k] -= coarse[k];
+            }
+        }
+    }
+    sound = sound && coarse != NULL;
+    free(coarse);
+    replay_state_close(&state, fine);
+    return sound;
+}
+
+bool fit_base_open(struct fit_base *base, const struct replay *fine, const struct replay *coarse,
+                   const struct gap_model *model) {
+    const struct replay *replay = coarse != NULL ? coarse : fine;
     memset(base, 0, sizeof *base);
     base->model = *model;
+    base->replay = replay;
     if (!replay_state_open(&base->state, replay) || !replay_state_open(&base->moved[0], replay) ||
         !replay_state_open(&base->moved[1], replay)) {
-        fit_base_close(base, replay);
+        fit_base_close(base);
         return false;
     }
     replay_pressures(replay, model, &base->state);
@@ -92,13 +129,21 @@ bool fit_base_open(struct fit_base *base, const struct replay *replay, const str
         replay_pressures(replay, &moved, &base->moved[k]);
         difference_of(replay, &base->state, NOMINAL_NUDGE, &base->moved[k]);
     }
+    if (coarse != NULL && !find_offsets(base, fine)) {
+        fit_base_close(base);
+        return false;
+    }
     return true;
 }
 
-void fit_base_close(struct fit_base *base, const struct replay *replay) {
-    replay_state_close(&base->state, replay);
-    replay_state_close(&base->moved[0], replay);
-    replay_state_close(&base->moved[1], replay);
+void fit_base_close(struct fit_base *base) {
+    if (base->replay != NULL) {
+        replay_state_close(&base->state, base->replay);
+        replay_state_close(&base->moved[0], base->replay);
+        replay_state_close(&base->moved[1], base->replay);
+        free(base->offset[0]);
+        memset(base, 0, sizeof *base);
+    }
 }
 
 /* state = from + the base's derivatives times the changes of the nominal parameters. */
@@ -132,7 +177,8 @@ static void copy_state(const struct replay *replay, const struct replay_state *f
 
 /* --- fitter --- */
 
-bool fitter_open(struct fitter *fitter, const struct replay *replay, const struct fit_base *base) {
+bool fitter_open(struct fitter *fitter, const struct fit_base *base) {
+    const struct replay *replay = base->replay;
     memset(fitter, 0, sizeof *fitter);
     fitter->replay = replay;
     fitter->base = base;
@@ -158,11 +204,22 @@ void fitter_close(struct fitter *fitter) {
     memset(fitter, 0, sizeof *fitter);
 }
 
+/* Residuals of the state; a coarse replay with what it is known to be off by. */
+static void take_residuals(const struct fitter *fitter, const struct gap_model *model, const struct replay_state *state,
+                           double *residual) {
+    replay_take_pressures(fitter->replay, state, residual);
+    replay_tip(fitter->replay, model, state, false, residual);
+    const double *offset = fitter->base->offset[replay_needs_samples(model) ? 0 : 1];
+    for (size_t k = 0; offset != NULL && k < fitter->replay->residuals; k++) {
+        residual[k] += offset[k];
+    }
+}
+
 static void evaluate_into(struct fitter *fitter, const struct gap_model *model, struct replay_state *state,
                           double *residual) {
     const struct fit_base *base = fitter->base;
-    const bool sensors = base != NULL && (has_sensor_effects(model) || has_sensor_effects(&base->model));
-    if (base != NULL && same_gas(model, &base->model) && (!sensors || all_have_duties(fitter->replay))) {
+    const bool sensors = (has_sensor_effects(model) || has_sensor_effects(&base->model));
+    if (same_gas(model, &base->model) && (!sensors || all_have_duties(fitter->replay))) {
         const double change[2] = {model->stiffness_scale - base->model.stiffness_scale,
                                   model->supply_scale - base->model.supply_scale};
         shift_state(fitter->replay, base, &base->state, change, state);
@@ -172,8 +229,7 @@ static void evaluate_into(struct fitter *fitter, const struct gap_model *model, 
     } else {
         replay_pressures(fitter->replay, model, state);
     }
-    replay_take_pressures(fitter->replay, state, residual);
-    replay_tip(fitter->replay, model, state, false, residual);
+    take_residuals(fitter, model, state, residual);
 }
 
 void fitter_evaluate(struct fitter *fitter, const struct gap_model *model) {
@@ -232,7 +288,7 @@ static void fill_column(struct fitter *fitter, struct gap_model *model, const st
     const double kept = *parameter->value;
     double step = index < 2 ? NOMINAL_NUDGE : STEP_SHARE * parameter->scale;
     step = kept + step > parameter->most ? -step : step;
-    const bool nominal = index < 2 && fitter->base != NULL;
+    const bool nominal = index < 2;
     const bool upstream = index >= 2 && gap_effect_upstream(model->effect[parameter->effect].kind);
     *parameter->value = kept + step;
     if (nominal) {
@@ -245,8 +301,7 @@ static void fill_column(struct fitter *fitter, struct gap_model *model, const st
         replay_pressures(fitter->replay, model, &fitter->trial);
     }
     const struct replay_state *state = nominal || upstream || index < 2 ? &fitter->trial : &fitter->state;
-    replay_take_pressures(fitter->replay, state, fitter->moved);
-    replay_tip(fitter->replay, model, state, false, fitter->moved);
+    take_residuals(fitter, model, state, fitter->moved);
     *parameter->value = kept;
     for (size_t k = 0; k < fitter->replay->residuals; k++) {
         column[k] = (fitter->moved[k] - fitter->residual[k]) / step;

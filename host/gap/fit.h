@@ -10,6 +10,8 @@
 
 struct fit_base {
     struct gap_model model; /* its downstream effects do not matter here */
+    const struct replay *replay;
+    double *offset[2];      /* [residuals] fine less coarse, of the base: with every tip sample, with one a block; NULL: fine */
     struct replay_state state;
     struct replay_state moved[2]; /* derivatives by stiffness and supply scale */
 };
@@ -46,9 +48,11 @@ struct fitter {
     bool wants_covariance; /* else fit->covariance stays zero, which saves a Jacobian */
 };
 
-bool fit_base_open(struct fit_base *base, const struct replay *replay, const struct gap_model *model);
-void fit_base_close(struct fit_base *base, const struct replay *replay);
-bool fitter_open(struct fitter *fitter, const struct replay *replay, const struct fit_base *base);
+/* `coarse` NULL: fits replay finely. Otherwise they replay coarsely, and the base says by how much that errs. */
+bool fit_base_open(struct fit_base *base, const struct replay *fine, const struct replay *coarse,
+                   const struct gap_model *model);
+void fit_base_close(struct fit_base *base);
+bool fitter_open(struct fitter *fitter, const struct fit_base *base);
 void fitter_close(struct fitter *fitter);
 
 /* Residuals of a model into fitter->residual (and its pressures into fitter->state). */

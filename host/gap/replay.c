@@ -4,8 +4,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-#define STEP_US REPLAY_STEP_US
-#define PRESSURE_BLOCK_STEPS ((size_t)(REPLAY_PRESSURE_BLOCK_S * 1e6 / STEP_US + 0.5))
+#define PRESSURE_BLOCK_US ((int64_t)(REPLAY_PRESSURE_BLOCK_S * 1e6 + 0.5))
 #define TIP_BLOCK_S REPLAY_TIP_BLOCK_S
 #define HELD_OUT_S 2.5          /* lengths of the blocks that are kept from the fit, every other one */
 #define SUPPLY_SPREAD_PA 60.0   /* of a block: how well a supply reading says what the valves feel */
@@ -22,8 +21,8 @@
 
 /* --- opening --- */
 
-static size_t block_of_step(size_t step) {
-    return step / PRESSURE_BLOCK_STEPS;
+static size_t block_of_step(const struct replay *replay, size_t step) {
+    return step / (size_t)(PRESSURE_BLOCK_US / replay->step_us);
 }
 
 static size_t tip_block(const struct replay_run *run, size_t tip) {
@@ -36,24 +35,38 @@ static bool held_out_at(const struct replay *replay, size_t run, double since_s)
     return ((size_t)(since_s / HELD_OUT_S) + run) % 2 == 1;
 }
 
+static void pick_tips(struct replay_run *run) {
+    run->picks = 0;
+    for (size_t i = 0; i < run->run->tips;) {
+        const size_t first = i, block = tip_block(run, i);
+        while (i < run->run->tips && tip_block(run, i) == block) {
+            i++;
+        }
+        run->pick[run->picks++] = (uint32_t)((first + i - 1) / 2);
+    }
+}
+
 static bool lay_out(struct replay *replay, size_t index) {
     struct replay_run *run = &replay->run[index];
     const struct gap_run *data = run->run;
     const int64_t period_us = replay->nominal.valve.period_us;
     const int64_t first_us = llround(1e6 * data->time_s[0]), last_us = llround(1e6 * data->time_s[data->rows - 1]);
+    const int64_t step_us = replay->step_us;
     run->start_us = first_us / period_us * period_us;
-    run->steps = (size_t)((last_us - run->start_us + STEP_US - 1) / STEP_US) + 1;
-    run->blocks = block_of_step(run->steps) + 1;
+    run->blocks = (size_t)((last_us - run->start_us) / PRESSURE_BLOCK_US) + 2;
+    run->steps = (run->blocks - 1) * (size_t)(PRESSURE_BLOCK_US / step_us);
     run->tip_blocks = data->tips > 0 ? tip_block(run, data->tips - 1) + 1 : 0;
     run->row_step = malloc(data->rows * sizeof *run->row_step);
     run->variance = malloc(3 * run->blocks * sizeof *run->variance);
-    if (run->row_step == NULL || run->variance == NULL) {
+    run->pick = malloc((run->tip_blocks + 1) * sizeof *run->pick);
+    if (run->row_step == NULL || run->variance == NULL || run->pick == NULL) {
         return false;
     }
     for (size_t row = 0; row < data->rows; row++) {
         const int64_t since_us = llround(1e6 * data->time_s[row]) - run->start_us;
-        run->row_step[row] = (uint32_t)((since_us + STEP_US - 1) / STEP_US);
+        run->row_step[row] = (uint32_t)((since_us + step_us - 1) / step_us);
     }
+    pick_tips(run);
     run->pressure_at = replay->residuals;
     run->supply_at = run->pressure_at + 3 * run->blocks;
     run->tip_at = run->supply_at + run->blocks;
@@ -156,7 +169,7 @@ static bool find_noise(struct replay_run *run) {
     return true;
 }
 
-static void find_variance(struct replay_run *run) {
+static void find_variance(const struct replay *replay, struct replay_run *run) {
     const struct gap_run *data = run->run;
     const double one = run->reading_noise_pa * run->reading_noise_pa;
     for (size_t i = 0; i < 3 * run->blocks; i++) {
@@ -164,7 +177,7 @@ static void find_variance(struct replay_run *run) {
     }
     for (size_t row = 0; row < data->rows; row++) {
         for (size_t c = 0; c < 3; c++) {
-            run->variance[3 * block_of_step(run->row_step[row]) + c] += !isnan(data->reading_pa[3 * row + c]);
+            run->variance[3 * block_of_step(replay, run->row_step[row]) + c] += !isnan(data->reading_pa[3 * row + c]);
         }
     }
     for (size_t i = 0; i < 3 * run->blocks; i++) {
@@ -173,12 +186,13 @@ static void find_variance(struct replay_run *run) {
     }
 }
 
-bool replay_open(struct replay *replay, const struct gap_data *data, const struct bend_table *table,
-                 const struct plant_parameters *nominal) {
+static bool open_with_step(struct replay *replay, const struct gap_data *data, const struct bend_table *table,
+                           const struct plant_parameters *nominal, int64_t step_us) {
     memset(replay, 0, sizeof *replay);
     replay->data = data;
     replay->table = table;
     replay->nominal = *nominal;
+    replay->step_us = step_us;
     for (size_t i = 0; i < data->runs; i++) {
         replay->run[i].run = &data->run[i];
         replay->runs++;
@@ -187,7 +201,7 @@ bool replay_open(struct replay *replay, const struct gap_data *data, const struc
             return false;
         }
         find_start(&replay->run[i]);
-        find_variance(&replay->run[i]);
+        find_variance(replay, &replay->run[i]);
     }
     replay->weight = calloc(replay->residuals, sizeof *replay->weight);
     replay->held_out = calloc(replay->residuals, sizeof *replay->held_out);
@@ -201,10 +215,35 @@ bool replay_open(struct replay *replay, const struct gap_data *data, const struc
     return true;
 }
 
+bool replay_open(struct replay *replay, const struct gap_data *data, const struct bend_table *table,
+                 const struct plant_parameters *nominal) {
+    return open_with_step(replay, data, table, nominal, REPLAY_STEP_US);
+}
+
+bool replay_open_coarse(struct replay *coarse, const struct replay *fine) {
+    const bool divides = fine->nominal.valve.period_us % REPLAY_COARSE_STEP_US == 0;
+    if (!open_with_step(coarse, fine->data, fine->table, &fine->nominal, divides ? REPLAY_COARSE_STEP_US : REPLAY_STEP_US)) {
+        return false;
+    }
+    coarse->coarse = true;
+    replay_follow(coarse, fine);
+    return true;
+}
+
+void replay_follow(struct replay *coarse, const struct replay *fine) {
+    coarse->rigid = fine->rigid;
+    memcpy(coarse->weight, fine->weight, fine->residuals * sizeof *fine->weight);
+    for (size_t i = 0; i < fine->runs; i++) {
+        memcpy(coarse->run[i].smoother, fine->run[i].smoother, sizeof fine->run[i].smoother);
+        coarse->run[i].duty_from_next_period = fine->run[i].duty_from_next_period;
+    }
+}
+
 void replay_close(struct replay *replay) {
     for (size_t i = 0; i < replay->runs; i++) {
         free(replay->run[i].row_step);
         free(replay->run[i].variance);
+        free(replay->run[i].pick);
     }
     free(replay->weight);
     free(replay->held_out);
@@ -261,6 +300,7 @@ static double shown(double pressure_pa, double noise_pa) {
 
 /* Walks over the rows beside the simulation. */
 struct row_walk {
+    const struct replay *replay;
     const struct replay_run *run;
     size_t row;       /* next to be met */
     double *sum;      /* [3 * blocks] */
@@ -273,10 +313,11 @@ static void meet_rows(struct row_walk *walk, size_t step, const double before_pa
                       double supply_pa) {
     const struct replay_run *run = walk->run;
     const struct gap_run *data = run->run;
+    const int64_t step_us = walk->replay->step_us;
     for (; walk->row < data->rows && run->row_step[walk->row] <= step; walk->row++) {
-        const size_t row = walk->row, block = block_of_step(step);
-        const double end_s = 1e-6 * (double)(run->start_us + (int64_t)step * STEP_US);
-        const double left = (end_s - data->time_s[row]) / (1e-6 * STEP_US);
+        const size_t row = walk->row, block = block_of_step(walk->replay, step);
+        const double end_s = 1e-6 * (double)(run->start_us + (int64_t)step * step_us);
+        const double left = (end_s - data->time_s[row]) / (1e-6 * (double)step_us);
         for (size_t c = 0; c < 3; c++) {
             const double reading_pa = data->reading_pa[3 * row + c];
             if (!isnan(reading_pa)) {
@@ -341,15 +382,15 @@ static void simulate_run(const struct replay *replay, const struct gap_model *mo
     memcpy(before_pa, run->initial_pa, sizeof before_pa);
     meet_rows(walk, 0, before_pa, before_pa, plant->influence.supply_pa);
     for (size_t step = 1; step <= run->steps; step++) {
-        const int64_t from_us = run->start_us + (int64_t)(step - 1) * STEP_US;
+        const int64_t from_us = run->start_us + (int64_t)(step - 1) * replay->step_us;
         if (from_us % period_us == 0) {
             double duty[3];
             duty_at(run, &duty_row, from_us, duty);
             plant->temperature_k = temperature_at(run->run, walk->row);
             plant_start_period(plant, from_us, duty);
         }
-        cut_valves(run, plant, &cut_row, from_us + STEP_US);
-        plant_step(plant, true, from_us, from_us + STEP_US);
+        cut_valves(run, plant, &cut_row, from_us + replay->step_us);
+        plant_step(plant, true, from_us, from_us + replay->step_us);
         memcpy(pressure_pa + 3 * step, plant->pressure_pa, sizeof plant->pressure_pa);
         meet_rows(walk, step, before_pa, plant->reading_pa, plant->influence.supply_pa);
         memcpy(before_pa, plant->reading_pa, sizeof before_pa);
@@ -365,9 +406,8 @@ static double between(const double *value, size_t stride, size_t count, double p
 }
 
 /* Block of the level at a time in steps: levels stand for their block's middle. */
-static double block_position(double step) {
-    const double steps = (double)(PRESSURE_BLOCK_STEPS);
-    return step / steps - 0.5;
+static double block_position(const struct replay *replay, double step) {
+    return step * (double)replay->step_us / (double)PRESSURE_BLOCK_US - 0.5;
 }
 
 /* Sensors beside pressures that are known at the end of each step: sums of differences into the walk. */
@@ -380,8 +420,8 @@ static void show_run(const struct replay *replay, const struct gap_model *model,
     walk->row = 0;
     memcpy(before_pa, pressure_pa, sizeof before_pa);
     for (size_t step = 0; step <= run->steps; step++) {
-        struct effect_signals signals = {.time_s = 1e-6 * (double)(run->start_us + (int64_t)step * STEP_US),
-                                         .step_s = 1e-6 * STEP_US,
+        struct effect_signals signals = {.time_s = 1e-6 * (double)(run->start_us + (int64_t)step * replay->step_us),
+                                         .step_s = 1e-6 * (double)replay->step_us,
                                          .temperature_k = NAN,
                                          .table = replay->table,
                                          .stiffness_scale = model->stiffness_scale,
@@ -402,7 +442,7 @@ void replay_readings(const struct replay *replay, const struct gap_model *model,
     for (size_t i = 0; i < replay->runs; i++) {
         const struct replay_run *run = &replay->run[i];
         double *room = calloc(2 * run->blocks, sizeof *room);
-        struct row_walk walk = {.run = run, .sum = state->difference[i], .supply = room};
+        struct row_walk walk = {.replay = replay, .run = run, .sum = state->difference[i], .supply = room};
         if (room != NULL) {
             walk.count = room + run->blocks;
             show_run(replay, model, i, &plant, state->pressure_pa[i], &walk);
@@ -422,7 +462,7 @@ static void guess_run(const struct replay *replay, const struct gap_model *model
     for (size_t step = 0; step <= run->steps; step++) {
         double wanted[3] = {0.0, 0.0, 0.0};
         if (!run->run->has_reading && run->run->has_command) {
-            const double now_s = 1e-6 * (double)(run->start_us + (int64_t)step * STEP_US);
+            const double now_s = 1e-6 * (double)(run->start_us + (int64_t)step * replay->step_us);
             while (row + 1 < run->run->rows && run->run->time_s[row + 1] <= now_s + 5e-7) {
                 row++;
             }
@@ -440,7 +480,7 @@ static void guess_run(const struct replay *replay, const struct gap_model *model
             }
             if (smoother_run(&run->smoother[c], observed, variance, run->blocks, smoothed)) {
                 for (size_t step = 0; step <= run->steps; step++) {
-                    pressure_pa[3 * step + c] += between(smoothed, 1, run->blocks, block_position((double)step));
+                    pressure_pa[3 * step + c] += between(smoothed, 1, run->blocks, block_position(replay, (double)step));
                 }
             }
         }
@@ -452,7 +492,7 @@ void replay_pressures(const struct replay *replay, const struct gap_model *model
     struct plant plant;
     for (size_t i = 0; i < replay->runs; i++) {
         const struct replay_run *run = &replay->run[i];
-        struct row_walk walk = {.run = run, .sum = state->difference[i], .supply = state->supply[i]};
+        struct row_walk walk = {.replay = replay, .run = run, .sum = state->difference[i], .supply = state->supply[i]};
         memset(walk.sum, 0, 3 * run->blocks * sizeof(double));
         memset(walk.supply, 0, run->blocks * sizeof(double));
         walk.count = calloc(3 * run->blocks + 3, sizeof(double));
@@ -527,14 +567,23 @@ static void rotation_between(const double measured[4], const double simulated[4]
 static void pressures_at(const struct replay *replay, const struct replay_state *state, size_t index, double time_s,
                          bool from_duties, double nudge_pa, size_t nudged, double pressure_pa[3]) {
     const struct replay_run *run = &replay->run[index];
-    const double step = (time_s - 1e-6 * (double)run->start_us) / (1e-6 * STEP_US);
+    const double step = (time_s - 1e-6 * (double)run->start_us) / (1e-6 * (double)replay->step_us);
     for (size_t c = 0; c < 3; c++) {
         pressure_pa[c] = between(state->pressure_pa[index] + c, 3, run->steps + 1, step);
         if (!from_duties) {
-            pressure_pa[c] += between(state->correction[index] + c, 3, run->blocks, block_position(step));
+            pressure_pa[c] += between(state->correction[index] + c, 3, run->blocks, block_position(replay, step));
         }
         pressure_pa[c] += c == nudged ? nudge_pa : 0.0;
     }
+}
+
+bool replay_needs_samples(const struct gap_model *model) {
+    for (size_t e = 0; e < model->count; e++) {
+        if (model->effect[e].kind->by_sample || model->effect[e].kind->by_chance) {
+            return true;
+        }
+    }
+    return false;
 }
 
 static void tip_of_run(const struct replay *replay, const struct gap_model *model, const struct replay_state *state,
@@ -544,8 +593,10 @@ static void tip_of_run(const struct replay *replay, const struct gap_model *mode
     struct plant plant;
     size_t block = 0, count = 0, row = 0;
     double sum[REPLAY_TIP_CHANNELS] = {0.0}, before_s = 1e-6 * (double)run->start_us;
+    const bool picked = replay->coarse && !replay_needs_samples(model);
     set_up_plant(replay, model, &plant);
-    for (size_t i = 0; i < data->tips; i++) {
+    for (size_t n = 0; n < (picked ? run->picks : data->tips); n++) {
+        const size_t i = picked ? run->pick[n] : n;
         const struct gap_tip *tip = &data->tip[i];
         double pressure_pa[3], rotation[3] = {0.0, 0.0, 0.0};
         const size_t at = tip_block(run, i);
@@ -620,7 +671,7 @@ static void readings_as_differences(const struct replay *replay, struct replay_s
     memset(state->difference[index], 0, 3 * run->blocks * sizeof(double));
     for (size_t row = 0; row < run->run->rows && count != NULL; row++) {
         for (size_t c = 0; c < 3; c++) {
-            const size_t at = 3 * block_of_step(run->row_step[row]) + c;
+            const size_t at = 3 * block_of_step(replay, run->row_step[row]) + c;
             const double reading_pa = run->run->reading_pa[3 * row + c];
             if (!isnan(reading_pa)) {
                 count[at] += 1.0;

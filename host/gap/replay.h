@@ -18,13 +18,14 @@
 
 #define REPLAY_TIP_CHANNELS 6
 #define REPLAY_STEP_US 2000           /* of the gas; valves switch in between, where they do */
+#define REPLAY_COARSE_STEP_US 5000
 #define REPLAY_PRESSURE_BLOCK_S 0.02  /* two PWM periods */
 #define REPLAY_TIP_BLOCK_S 0.05
 
 struct replay_run {
     const struct gap_run *run;
     int64_t start_us;
-    size_t steps;           /* of REPLAY_STEP_US */
+    size_t steps;           /* of the replay's step */
     size_t blocks;          /* of pressure */
     size_t tip_blocks;
     size_t pressure_at;     /* where its residuals start in the vector */
@@ -38,6 +39,8 @@ struct replay_run {
     struct smoother smoother[3];
     bool duty_from_next_period; /* a duty in the row of a period's start counts for the period after it */
     double *variance;       /* [3 * blocks] of a block's mean reading, Pa^2; infinite: none */
+    size_t picks;
+    uint32_t *pick;         /* [picks] the tip sample in the middle of each block that has any */
 };
 
 struct replay {
@@ -47,6 +50,8 @@ struct replay {
     size_t runs;
     struct replay_run run[GAP_RUNS_MAX];
     size_t residuals;
+    int64_t step_us;
+    bool coarse;       /* longer steps, and of each tip block one sample: see replay_open_coarse() */
     bool rigid;        /* pressures are as the duties make them, but for a constant: the tip then tells of them finest */
     double *weight;    /* [residuals] 1 / (noise of a block) */
     uint8_t *held_out; /* [residuals] 1: not used to fit */
@@ -63,6 +68,11 @@ struct replay_state {
 /* `data` and `table` are kept by pointer. Finds noise levels and smoothing on the nominal model. False: out of memory. */
 bool replay_open(struct replay *replay, const struct gap_data *data, const struct bend_table *table,
                  const struct plant_parameters *nominal);
+/* The same of some of the cost, for differences between models: what a model's change does is told by a coarse replay of
+ * both, and added to a fine replay of one (the additive correction of Kennedy and O'Hagan 2000). False: out of memory. */
+bool replay_open_coarse(struct replay *coarse, const struct replay *fine);
+/* Weights, smoothing and timing of the fine one, which may have been tuned since. */
+void replay_follow(struct replay *coarse, const struct replay *fine);
 void replay_close(struct replay *replay);
 bool replay_state_open(struct replay_state *state, const struct replay *replay);
 void replay_state_close(struct replay_state *state, const struct replay *replay);
@@ -76,6 +86,8 @@ void replay_correct(const struct replay *replay, struct replay_state *state);
 /* Tip residuals into `residual`, from the state's pressures; `from_duties`: r3 instead of r2. */
 void replay_tip(const struct replay *replay, const struct gap_model *model, const struct replay_state *state,
                 bool from_duties, double *residual);
+/* Does the model ask for every tip sample, in a coarse replay too? */
+bool replay_needs_samples(const struct gap_model *model);
 /* Pressure and supply residuals of the state into `residual`. */
 void replay_take_pressures(const struct replay *replay, const struct replay_state *state, double *residual);
 /* Once, on the nominal model: when the logged duties count, then as replay_tune(). */

@@ -199,7 +199,7 @@ static bool crew_open(struct crew *crew, const struct search *search, const stru
     const int wanted = search->options.threads > 0 ? search->options.threads : omp_get_max_threads();
     crew->fitter = calloc((size_t)wanted, sizeof *crew->fitter);
     for (; crew->fitter != NULL && crew->count < wanted; crew->count++) {
-        if (!fitter_open(&crew->fitter[crew->count], &search->replay, base)) {
+        if (!fitter_open(&crew->fitter[crew->count], base)) {
             break;
         }
     }
@@ -373,18 +373,19 @@ static bool recalibrate(struct search *search, struct fit *fit, bool fit_nominal
     struct fitter fitter;
     bool sound = replay_state_open(&state, &search->replay);
     for (int round = 0; round < 3 && sound; round++) {
-        sound = replay_tune(&search->replay, &fit->model, &state) && fit_base_open(&base, &search->replay, &fit->model);
+        sound = replay_tune(&search->replay, &fit->model, &state) && fit_base_open(&base, &search->replay, NULL, &fit->model);
         if (!sound) {
             break;
         }
-        sound = fitter_open(&fitter, &search->replay, &base);
+        sound = fitter_open(&fitter, &base);
         if (sound) {
             fitter_run(&fitter, fit, fit_nominal ? NOMINAL_ROUNDS : 0, fit_nominal);
             fitter_close(&fitter);
         }
-        fit_base_close(&base, &search->replay);
+        fit_base_close(&base);
     }
     replay_state_close(&state, &search->replay);
+    replay_follow(&search->coarse, &search->replay);
     return sound;
 }
 
@@ -470,7 +471,7 @@ static bool add_one(struct search *search, struct workspace *room, size_t step) 
     struct crew crew = {NULL, 0};
     struct fit next = search->best;
     bool found = false;
-    if (fit_base_open(&base, &search->replay, &search->best.model) && crew_open(&crew, search, &base)) {
+    if (fit_base_open(&base, &search->replay, &search->coarse, &search->best.model) && crew_open(&crew, search, &base)) {
         size_t count = screen_all(search, &crew, &search->best.model, room->list, room->candidates, room->fits, room->order);
         count = count < REFINED_MAX ? count : REFINED_MAX;
         refine(search, &crew, room->order, count, step);
@@ -503,7 +504,7 @@ static bool add_one(struct search *search, struct workspace *room, size_t step) 
         }
     }
     crew_close(&crew);
-    fit_base_close(&base, &search->replay);
+    fit_base_close(&base);
     search->best = next;
     return found;
 }
@@ -520,11 +521,11 @@ static void drop_idle(struct search *search) {
             memmove(&without.model.effect[e], &without.model.effect[e + 1],
                     (without.model.count - e - 1) * sizeof without.model.effect[0]);
             without.model.count--;
-            if (fit_base_open(&base, &search->replay, &without.model) && crew_open(&crew, search, &base)) {
+            if (fit_base_open(&base, &search->replay, &search->coarse, &without.model) && crew_open(&crew, search, &base)) {
                 fitter_run(&crew.fitter[0], &without, REFINE_ROUNDS, true);
             }
             crew_close(&crew);
-            fit_base_close(&base, &search->replay);
+            fit_base_close(&base);
             if (!earns_place(search, &without, &search->best)) {
                 search->best = without;
                 dropped = true;
@@ -546,17 +547,17 @@ static bool prepare(struct search *search) {
 static bool fit_everything(struct search *search) {
     struct fit_base base;
     struct fitter fitter;
-    bool sound = fit_base_open(&base, &search->replay, &search->best.model);
+    bool sound = fit_base_open(&base, &search->replay, NULL, &search->best.model);
     search->everything = search->best;
     if (sound) {
-        sound = fitter_open(&fitter, &search->replay, &base);
+        sound = fitter_open(&fitter, &base);
         if (sound) {
             fitter.use_all = true;
             fitter.wants_covariance = true;
             fitter_run(&fitter, &search->everything, REFINE_ROUNDS, true);
             fitter_close(&fitter);
         }
-        fit_base_close(&base, &search->replay);
+        fit_base_close(&base);
     }
     return sound;
 }
@@ -612,7 +613,8 @@ bool search_run(struct search *search, const struct gap_data *data, const struct
     search->options = *options;
     const struct gap_model plain = {.stiffness_scale = 1.0, .supply_scale = 1.0};
     search->nominal.model = plain;
-    bool sound = room != NULL && replay_open(&search->replay, data, table, nominal);
+    bool sound = room != NULL && replay_open(&search->replay, data, table, nominal) &&
+                 replay_open_coarse(&search->coarse, &search->replay);
     say(search, "recalibration", 0, 1);
     sound = sound && prepare(search);
     sound = sound && recalibrate(search, &search->nominal, false);
@@ -652,4 +654,5 @@ bool search_run(struct search *search, const struct gap_data *data, const struct
 
 void search_close(struct search *search) {
     replay_close(&search->replay);
+    replay_close(&search->coarse);
 }

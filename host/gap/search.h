@@ -28,6 +28,7 @@ struct search_trial {
 struct search {
     const struct gap_data *data;
     struct replay replay;
+    struct replay coarse; /* follows it */
     struct search_options options;
     struct fit nominal;      /* nothing fitted */
     struct fit recalibrated; /* stiffness and supply fitted */

@@ -108,6 +108,7 @@ static const struct effect_kind tip_latency = {
                  "which has a tail",
     .stage = EFFECT_STAGE_TIP_SENSOR,
     .scope = EFFECT_GLOBAL,
+    .by_sample = true,
     .parameter_count = 1,
     .parameter = {[DELAY] = {"delay", "s", 0.0, DELAY_MOST_S, 0.03, 0.0}},
     .pose = delay};
