@@ -191,3 +191,72 @@ void body_bend_under(const struct bend_table *table, double stiffness_scale, con
     shape->bend_x_rad = b[0];
     shape->bend_y_rad = b[1];
 }
+
+/* --- along the arc --- */
+
+#define SAG_NODES 10
+
+static void cross3(const double a[3], const double b[3], double product[3]) {
+    product[0] = a[1] * b[2] - a[2] * b[1];
+    product[1] = a[2] * b[0] - a[0] * b[2];
+    product[2] = a[0] * b[1] - a[1] * b[0];
+}
+
+/* Place and tangent on the arc at `along_m` from its start, in the base frame but for the start's height. */
+static void arc_at(const struct body_shape *shape, double arc_m, double along_m, double place_m[3], double tangent[3]) {
+    const double bend = hypot(shape->bend_x_rad, shape->bend_y_rad), angle = bend * along_m / arc_m;
+    const bool straight = bend < STRAIGHT_RAD;
+    const double x = straight ? 1.0 : shape->bend_x_rad / bend, y = straight ? 0.0 : shape->bend_y_rad / bend;
+    const double across_m = straight ? 0.0 : arc_m / bend * (1.0 - cos(angle));
+    const double sine = straight ? 0.0 : sin(angle);
+    place_m[0] = x * across_m;
+    place_m[1] = y * across_m;
+    place_m[2] = straight ? along_m : arc_m / bend * sine;
+    tangent[0] = x * sine;
+    tangent[1] = y * sine;
+    tangent[2] = straight ? 1.0 : cos(angle);
+}
+
+void body_sag_further(const struct bend_table *table, double stiffness_scale, const struct body_weight *weight,
+                      const struct body_shape *shape, struct tip_pose *pose) {
+    const double length_m = (double)table->module.chamber_length_m * shape->stretch;
+    const double arc_m = shape->active_fraction * length_m, part_m = arc_m / SAG_NODES;
+    const double straight_m = 0.5 * (length_m - arc_m), diameter_m = (double)table->module.outer_diameter_m;
+    const double give = body_bending_compliance(table) / stiffness_scale, part_n = weight->spread_n / SAG_NODES;
+    double place[SAG_NODES][3], tangent[SAG_NODES][3], turn[SAG_NODES][3], mean[3] = {0.0, 0.0, 0.0};
+    double end_m[3], along[3], force_n = weight->end_n, first_nm[3];
+    arc_at(shape, arc_m, arc_m, end_m, along);
+    for (size_t k = 0; k < 3; k++) {
+        first_nm[k] = weight->end_n * (end_m[k] + weight->end_beyond_m * along[k]);
+    }
+    for (size_t i = SAG_NODES; i-- > 0;) {
+        double arm[3], moment[3];
+        arc_at(shape, arc_m, ((double)i + 0.5) * part_m, place[i], tangent[i]);
+        for (size_t k = 0; k < 3; k++) { /* of this part the half beyond its middle hangs at a quarter of its length */
+            arm[k] = first_nm[k] - force_n * place[i][k] + 0.125 * part_n * part_m * tangent[i][k];
+        }
+        cross3(arm, weight->down, moment);
+        const double twist = moment[0] * tangent[i][0] + moment[1] * tangent[i][1] + moment[2] * tangent[i][2];
+        const double pull_n = (force_n + 0.5 * part_n) * (weight->down[0] * tangent[i][0] + weight->down[1] * tangent[i][1] +
+                                                          weight->down[2] * tangent[i][2]);
+        for (size_t k = 0; k < 3; k++) {
+            turn[i][k] = give * part_m * (moment[k] - twist * tangent[i][k]);
+            mean[k] += turn[i][k] / SAG_NODES;
+            pose->position_m[k] += pull_n * give * diameter_m * diameter_m / 16.0 * part_m * tangent[i][k];
+            first_nm[k] += part_n * place[i][k];
+        }
+        force_n += part_n;
+    }
+    const double beyond_m = straight_m + (double)table->module.cap_distal_m;
+    for (size_t i = 0; i < SAG_NODES; i++) {
+        double arm[3], more[3], moved[3];
+        for (size_t k = 0; k < 3; k++) {
+            arm[k] = end_m[k] + beyond_m * along[k] - place[i][k];
+            more[k] = turn[i][k] - mean[k];
+        }
+        cross3(more, arm, moved);
+        for (size_t k = 0; k < 3; k++) {
+            pose->position_m[k] += moved[k];
+        }
+    }
+}

@@ -40,5 +40,11 @@ double body_distal_straight_m(const struct bend_table_module *module, const stru
 /* Bend `shape` to where the weight and the rubber's stiffness, so many times the table's, are in balance. */
 void body_bend_under(const struct bend_table *table, double stiffness_scale, const struct body_weight *weight,
                      struct body_shape *shape);
+/* What an arc leaves out of a module under a weight: curvature is greatest where the moment is, near the base, so that for
+ * the same bend the tip sags further (a cantilever F L^3 / (3 EI) at a slope of F L^2 / (2 EI), an arc L / 2 times that
+ * slope; Timoshenko 1955); and the weight stretches it, by F / (EA), E A = 16 E I / d^2 as of a round section. Moves the
+ * pose of the shape that body_bend_under() left. */
+void body_sag_further(const struct bend_table *table, double stiffness_scale, const struct body_weight *weight,
+                      const struct body_shape *shape, struct tip_pose *pose);
 
 #endif

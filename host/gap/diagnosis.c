@@ -9,7 +9,7 @@
 #define DEGREES (180.0 / M_PI)
 #define NINETY_PERCENT 1.645
 /* A gap whose structure is below this share of the noise floor's square is none. */
-#define STRUCTURE_NONE 0.6
+#define STRUCTURE_NONE 0.2
 /* Recalibration is the answer where it leaves no more than that, or this share of what was there. */
 #define RECALIBRATED_SHARE 0.05
 /* Catalogue effects must close this share of the structured gap, or the gap is of an unknown kind. */
@@ -17,8 +17,10 @@
 #define CLOSED_LEAST_BY_MANY 0.975 /* by several: together they can bend to much that they are not */
 /* What forms that only nearly fit do to a parameter, as a share of the effect's size: seen against effects of other forms. */
 #define FORM_SHARE 0.025
-/* A trial this much worse than the best, as a share of the gap, is e times less believed. */
-#define BELIEF_SHARE 0.02
+/* A trial this much worse than the best is e times less believed: a share of the gap, for what the form of the right effect may
+ * be off by; as much again as the best leaves, by which its form is seen to be off; and what noise makes. */
+#define BELIEF_SHARE 0.002
+#define BELIEF_NOISE 10.0
 #define GROUP_LEAST 0.15 /* belief that puts a name into the group */
 #define SLUGGISH_SHARE 0.7
 #define SURE 0.60        /* belief above which one name is the verdict */
@@ -353,7 +355,7 @@ static bool measure_gaps(struct diagnosis *diagnosis, struct search *search) {
 /* --- which --- */
 
 static double held_out(const struct fit *fit) {
-    return fit->sums.pressure[1] + fit->sums.tip[1];
+    return fit_squares(&fit->sums, 1);
 }
 
 static bool names_kind(const struct gap_model *model, const struct effect_kind *kind) {
@@ -365,29 +367,69 @@ static bool names_kind(const struct gap_model *model, const struct effect_kind *
     return false;
 }
 
+/* The trial's effect that the rest of the best model does not have; NULL: none, or the rest is not all there. */
+static const struct effect *own_effect(const struct fit *fit, const struct gap_model *rest) {
+    const struct effect *own = NULL;
+    size_t others = 0;
+    for (size_t e = 0; e < fit->model.count; e++) {
+        const bool of_rest = names_kind(rest, fit->model.effect[e].kind);
+        others += of_rest;
+        own = !of_rest && own == NULL ? &fit->model.effect[e] : own;
+    }
+    return others < rest->count ? NULL : own;
+}
+
+static void list_alternatives(struct diagnosis *diagnosis, const struct search *search, size_t step,
+                              const struct gap_model *rest, const double *belief, const struct effect_kind *const *kinds,
+                              size_t count) {
+    diagnosis->alternatives = 0;
+    for (size_t t = 0; t < search->trials; t++) {
+        const struct fit *fit = &search->trial[t].fit;
+        const struct effect *own = search->trial[t].step == step && fit->sound ? own_effect(fit, rest) : NULL;
+        if (own == NULL) {
+            continue;
+        }
+        struct diagnosis_alternative entry = {fit, own, 0.0, fmax(fit_structure(&fit->sums, 1), 0.0)};
+        for (size_t i = 0; i < count; i++) {
+            entry.probability = kinds[i] == own->kind ? belief[i] : entry.probability;
+        }
+        size_t at = 0;
+        while (at < diagnosis->alternatives && diagnosis->alternative[at].effect->kind != own->kind) {
+            at++;
+        }
+        if (at < diagnosis->alternatives && held_out(diagnosis->alternative[at].fit) <= held_out(fit)) {
+            continue;
+        }
+        at = at < diagnosis->alternatives ? at : diagnosis->alternatives;
+        if (at == DIAGNOSIS_NAMES_MAX) {
+            at--;
+            if (held_out(diagnosis->alternative[at].fit) <= held_out(fit)) {
+                continue;
+            }
+        }
+        diagnosis->alternatives = at + 1 > diagnosis->alternatives ? at + 1 : diagnosis->alternatives;
+        for (; at > 0 && held_out(diagnosis->alternative[at - 1].fit) > held_out(fit); at--) {
+            diagnosis->alternative[at] = diagnosis->alternative[at - 1];
+        }
+        diagnosis->alternative[at] = entry;
+    }
+}
+
 /* Belief in each kind on top of the `rest` of the best model: the trials of its step, each kind by its best. */
 static void weigh_kinds(const struct search *search, size_t step, double *belief, const struct effect_kind **kinds,
                         size_t *count, const struct gap_model *rest, const struct effect_kind *own_kind) {
-    double best = INFINITY, worst = 0.0;
+    double best = INFINITY, excess = 0.0;
     *count = 0;
     for (size_t t = 0; t < search->trials; t++) {
         const struct search_trial *trial = &search->trial[t];
         if (trial->step != step || !trial->fit.sound) {
             continue;
         }
-        /* the kind that this trial has beyond the rest of the best model */
-        const struct effect_kind *own = NULL;
-        size_t others = 0;
-        for (size_t e = 0; e < trial->fit.model.count; e++) {
-            if (names_kind(rest, trial->fit.model.effect[e].kind)) {
-                others++;
-            } else {
-                own = trial->fit.model.effect[e].kind;
-            }
-        }
-        if (own == NULL || others < rest->count) {
+        const struct effect *effect = own_effect(&trial->fit, rest);
+        if (effect == NULL) {
             continue;
         }
+        const struct effect_kind *own = effect->kind;
         const double cost = held_out(&trial->fit);
         size_t at = 0;
         while (at < *count && kinds[at] != own) {
@@ -399,8 +441,10 @@ static void weigh_kinds(const struct search *search, size_t step, double *belief
         } else if (at < *count) {
             belief[at] = fmin(belief[at], cost);
         }
-        best = fmin(best, cost);
-        worst = fmax(worst, cost);
+        if (cost < best) {
+            best = cost;
+            excess = fit_structure(&trial->fit.sums, 1) * fit_count(&trial->fit.sums, 1);
+        }
     }
     if (gap_model_kinds(&search->best.model) == step + 1) {
         /* the best model itself: later steps may have found it */
@@ -415,9 +459,9 @@ static void weigh_kinds(const struct search *search, size_t step, double *belief
         belief[at] = fmin(belief[at], held_out(&search->best));
         best = fmin(best, belief[at]);
     }
-    const double before = step == 0 ? held_out(&search->recalibrated) : worst;
-    const double noise = best / fmax(search->best.sums.pressure_count[1] + search->best.sums.tip_count[1], 1.0);
-    const double scale = BELIEF_SHARE * fmax(before - best, 0.0) + 4.0 * noise;
+    const double before = step < SEARCH_STEPS_MAX ? held_out(&search->before[step]) : best;
+    const double noise = best / fmax(fit_count(&search->best.sums, 1), 1.0);
+    const double scale = BELIEF_SHARE * fmax(before - best, 0.0) + excess + BELIEF_NOISE * noise;
     double sum = 0.0;
     for (size_t i = 0; i < *count; i++) {
         belief[i] = exp(-(belief[i] - best) / scale);
@@ -504,10 +548,18 @@ static void believe(struct diagnosis *diagnosis, const struct search *search) {
     double belief[SEARCH_CANDIDATES_MAX];
     const struct effect_kind *kinds[SEARCH_CANDIDATES_MAX];
     size_t count = 0;
+    if (diagnosis->effects == 0) {
+        const struct gap_model none = {.count = 0};
+        weigh_kinds(search, 0, belief, kinds, &count, &none, NULL);
+        list_alternatives(diagnosis, search, 0, &none, belief, kinds, count);
+    }
     for (size_t e = 0; e < diagnosis->effects; e++) {
         struct gap_model rest;
         leave_out(&search->best.model, diagnosis->effect[e].place, &rest);
         weigh_kinds(search, gap_model_kinds(&rest), belief, kinds, &count, &rest, diagnosis->effect[e].kind);
+        if (e + 1 == diagnosis->effects) {
+            list_alternatives(diagnosis, search, gap_model_kinds(&rest), &rest, belief, kinds, count);
+        }
         diagnosis->effect[e].probability = count == 0 || diagnosis->effect[e].kind->by_chance ? 0.95 : 0.0;
         for (size_t i = 0; i < count; i++) {
             if (kinds[i] == diagnosis->effect[e].kind && !kinds[i]->by_chance) {

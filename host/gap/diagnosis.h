@@ -47,6 +47,14 @@ struct diagnosis_gap {
     double floor;
 };
 
+/* What was tried in place of the best model's last effect, each kind by its best: on which the verdict rests. */
+struct diagnosis_alternative {
+    const struct fit *fit;
+    const struct effect *effect;
+    double probability;
+    double structure; /* left, in units of the noise's mean square */
+};
+
 struct diagnosis {
     enum gap_verdict verdict;
     const char *stage;      /* of the locus; "" where there is none */
@@ -57,6 +65,8 @@ struct diagnosis {
     size_t group;
     const char *group_name[DIAGNOSIS_NAMES_MAX];
     double group_probability[DIAGNOSIS_NAMES_MAX];
+    size_t alternatives;
+    struct diagnosis_alternative alternative[DIAGNOSIS_NAMES_MAX];
     struct diagnosis_interval stiffness_scale;
     struct diagnosis_interval supply_scale;
     struct diagnosis_gap gap[DIAGNOSIS_RESIDUALS];

@@ -249,28 +249,47 @@ static void sum_up(const struct fitter *fitter, const double *residual, struct f
         for (size_t k = run->pressure_at; k < end; k++) {
             if (replay->weight[k] > 0.0) {
                 const int out = replay->held_out[k];
-                *(k < run->tip_at ? &sums->pressure[out] : &sums->tip[out]) += residual[k] * residual[k];
-                *(k < run->tip_at ? &sums->pressure_count[out] : &sums->tip_count[out]) += 1.0;
+                struct fit_part *part = &sums->part[out][k < run->tip_at ? FIT_PRESSURE : FIT_TIP];
+                part->square += residual[k] * residual[k];
+                part->count += 1.0;
                 const size_t stride = k < run->supply_at ? 3 : k < run->tip_at ? 1 : REPLAY_TIP_CHANNELS;
                 const size_t start = k < run->supply_at ? run->pressure_at : k < run->tip_at ? run->supply_at : run->tip_at;
                 if (k >= start + stride && replay->weight[k - stride] > 0.0 && replay->held_out[k - stride] == out) {
                     const double step = residual[k] - residual[k - stride];
-                    sums->noise[out] += 0.5 * step * step;
-                    sums->noise_count[out] += 1.0;
+                    part->noise += 0.5 * step * step;
+                    part->noise_count += 1.0;
                 }
             }
         }
     }
 }
 
+double fit_squares(const struct fit_sums *sums, int held_out) {
+    return sums->part[held_out][FIT_PRESSURE].square + sums->part[held_out][FIT_TIP].square;
+}
+
+double fit_count(const struct fit_sums *sums, int held_out) {
+    return sums->part[held_out][FIT_PRESSURE].count + sums->part[held_out][FIT_TIP].count;
+}
+
 double fit_mean_square(const struct fit_sums *sums, int held_out) {
-    const double count = sums->pressure_count[held_out] + sums->tip_count[held_out];
-    return count > 0.0 ? (sums->pressure[held_out] + sums->tip[held_out]) / count : 0.0;
+    const double count = fit_count(sums, held_out);
+    return count > 0.0 ? fit_squares(sums, held_out) / count : 0.0;
+}
+
+double fit_structure_of(const struct fit_sums *sums, int held_out, enum fit_group group) {
+    const struct fit_part *part = &sums->part[held_out][group];
+    const double noise = part->noise_count > 0.0 ? part->noise / part->noise_count : 0.0;
+    return part->count > 0.0 ? fmax(part->square / part->count - noise, 0.0) : 0.0;
 }
 
 double fit_structure(const struct fit_sums *sums, int held_out) {
-    const double noise = sums->noise_count[held_out] > 0.0 ? sums->noise[held_out] / sums->noise_count[held_out] : 0.0;
-    return fit_mean_square(sums, held_out) - noise;
+    double sum = 0.0;
+    for (int group = 0; group < FIT_GROUPS; group++) {
+        sum += fit_structure_of(sums, held_out, (enum fit_group)group) * sums->part[held_out][group].count;
+    }
+    const double count = fit_count(sums, held_out);
+    return count > 0.0 ? sum / count : 0.0;
 }
 
 static double cost_of(const struct fitter *fitter, const struct gap_model *model, const double *residual) {

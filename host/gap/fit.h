@@ -16,14 +16,19 @@ struct fit_base {
     struct replay_state moved[2]; /* derivatives by stiffness and supply scale */
 };
 
-/* Sums of squares of whitened residuals and their counts: [0] fitted, [1] held out. */
+enum fit_group { FIT_PRESSURE, FIT_TIP, FIT_GROUPS };
+
+/* Sums over whitened residuals of one group. */
+struct fit_part {
+    double square;
+    double count;
+    double noise; /* half the squares of differences of neighbouring blocks, and how many */
+    double noise_count;
+};
+
+/* [0] fitted, [1] held out. */
 struct fit_sums {
-    double pressure[2];
-    double tip[2];
-    double pressure_count[2];
-    double tip_count[2];
-    double noise[2]; /* half the squares of differences of neighbouring blocks, and how many */
-    double noise_count[2];
+    struct fit_part part[2][FIT_GROUPS];
 };
 
 struct fit {
@@ -63,9 +68,13 @@ void fitter_run(struct fitter *fitter, struct fit *fit, int rounds, bool fit_nom
  * one [1..3] at some size; negative where only the opposite effect would help. */
 void fitter_linear(struct fitter *fitter, const struct fit_base *base, const double *base_residual,
                    const struct effect *effect, double gain[4]);
-/* Mean square over pressure and tip, fitted or held out. */
-/* The same less what noise alone makes of it (von Neumann 1941): what is left to explain. */
-double fit_structure(const struct fit_sums *sums, int held_out);
+/* Squares over pressure and tip, fitted or held out; how many; and their mean. */
+double fit_squares(const struct fit_sums *sums, int held_out);
+double fit_count(const struct fit_sums *sums, int held_out);
 double fit_mean_square(const struct fit_sums *sums, int held_out);
+/* Of one group: mean square less what noise alone makes of it (von Neumann 1941), not below zero: what is left to explain. */
+double fit_structure_of(const struct fit_sums *sums, int held_out, enum fit_group group);
+/* The same of both, by their counts. */
+double fit_structure(const struct fit_sums *sums, int held_out);
 
 #endif

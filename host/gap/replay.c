@@ -9,8 +9,8 @@
 #define HELD_OUT_S 2.5          /* lengths of the blocks that are kept from the fit, every other one */
 #define SUPPLY_SPREAD_PA 60.0   /* of a block: how well a supply reading says what the valves feel */
 /* What a sensor's steps and the table's interpolation leave in a mean, however many samples it has. */
-#define POSITION_FLOOR_M 3e-5
-#define ANGLE_FLOOR_RAD (0.03 * M_PI / 180.0)
+#define POSITION_FLOOR_M 1.5e-5
+#define ANGLE_FLOOR_RAD (0.015 * M_PI / 180.0)
 #define READING_FLOOR_PA 4.0
 /* Least noise of one sample that is believed. */
 #define READING_LEAST_PA 20.0

@@ -152,6 +152,24 @@ static json_t *effects_json(const struct diagnosis *diagnosis) {
     return list;
 }
 
+static json_t *alternatives_json(const struct diagnosis *diagnosis) {
+    json_t *list = json_array();
+    for (size_t i = 0; i < diagnosis->alternatives; i++) {
+        const struct diagnosis_alternative *entry = &diagnosis->alternative[i];
+        const struct effect *effect = entry->effect;
+        json_t *parameters = json_object();
+        for (size_t k = 0; k < effect->kind->parameter_count; k++) {
+            json_object_set_new(parameters, effect->kind->parameter[k].name,
+                                json_pack("{s:f,s:s}", "value", effect->parameter[k], "unit", effect->kind->parameter[k].unit));
+        }
+        json_array_append_new(list, json_pack("{s:s,s:s,s:i,s:i,s:f,s:f,s:f,s:o}", "name", effect->kind->name, "stage",
+                                              effect_stage_name(effect->kind->stage), "form", (int)effect->form, "chamber",
+                                              (int)effect->chamber, "onset_s", effect->onset_s, "probability",
+                                              entry->probability, "structure", entry->structure, "parameters", parameters));
+    }
+    return list;
+}
+
 static json_t *gaps_json(const struct diagnosis *diagnosis) {
     json_t *object = json_object();
     for (size_t k = 0; k < DIAGNOSIS_RESIDUALS; k++) {
@@ -185,7 +203,7 @@ static json_t *report_json(const struct diagnosis *diagnosis, const struct gap_d
     }
     json_t *closed = interval_json(&diagnosis->closed, NULL);
     json_object_set_new(closed, "recalibration", json_real(diagnosis->closed_recalibration.value));
-    return json_pack("{s:s,s:o,s:s,s:{s:s,s:o,s:s},s:o,s:o,s:o,s:{s:o,s:o},s:o,s:o,s:s,s:s,s:o}", "verdict",
+    return json_pack("{s:s,s:o,s:s,s:{s:s,s:o,s:s},s:o,s:o,s:o,s:{s:o,s:o},s:o,s:o,s:s,s:s,s:o,s:o}", "verdict",
                      gap_verdict_name(diagnosis->verdict), "logs", logs, "module", data->module, "locus", "stage",
                      diagnosis->stage, "chambers", chambers, "regime", diagnosis->regime, "effects",
                      effects_json(diagnosis), "group", group, "structure",
@@ -193,7 +211,7 @@ static json_t *report_json(const struct diagnosis *diagnosis, const struct gap_d
                      interval_json(&diagnosis->stiffness_scale, "1"), "supply_scale",
                      interval_json(&diagnosis->supply_scale, "1"), "gap", gaps_json(diagnosis), "closed_fraction",
                      closed, "description", diagnosis->description, "next_experiment", diagnosis->next_experiment,
-                     "warnings", warnings);
+                     "warnings", warnings, "alternatives", alternatives_json(diagnosis));
 }
 
 bool gap_report_json(const struct diagnosis *diagnosis, const struct gap_data *data, const char *path, char *error,

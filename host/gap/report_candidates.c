@@ -7,7 +7,7 @@
 /* --- tried --- */
 
 static double held_out(const struct fit *fit) {
-    return fit->sums.pressure[1] + fit->sums.tip[1];
+    return fit_squares(&fit->sums, 1);
 }
 
 /* The best trial of each kind, of those with one effect. */

@@ -6,13 +6,17 @@
 #include <string.h>
 
 #define STARTS_MAX 4
+#define STARTS_CHEAP 8        /* where no gas need be replayed */
 #define SMALL_SHARE 0.25      /* of the typical size */
 #define SCREEN_ROUNDS 1
+#define SCREEN_ROUNDS_CHEAP 3
 #define REFINE_ROUNDS 6
 #define NOMINAL_ROUNDS 6
-#define REFINED_MAX 8         /* of the screened candidates */
+#define SETTLED_MAX 5         /* of the refined ones, the best, from a base of their own .. */
+#define SETTLE_ROUNDS 4
+#define REFINED_GAS_MAX 8     /* of the screened candidates that need gas replayed */
+#define REFINED_KIND_MAX 2    /* of each kind */
 #define PAIRED_MAX 6          /* the best alone, of which all pairs are tried */
-#define EFFECTS_MOST 3        /* on one module at once */
 #define GAIN_SHARE 0.03       /* an effect must take off this share of the held-out squares .. */
 #define GAIN_SIGMA 40.0       /* .. and so much that noise does not */
 #define REPEATS_CERTAIN 0.08  /* share of repeated samples that no noise makes */
@@ -22,10 +26,11 @@
 #define ONSET_FINE_S 0.15     /* an onset is not sought closer than that */
 #define COMPLETING_SHARE 0.5  /* of what is left, that a further effect must explain */
 #define POLISH_SHARE 0.002    /* of the gap: less than that is left by any form of the right effect */
-#define STRUCTURE_LEAST 0.3   /* mean square in units of a block's noise that is worth explaining */
+#define STRUCTURE_LEAST 0.15  /* mean square in units of a block's noise that is worth explaining */
 #define FAINT_LEFT 0.25        /* of a faint gap: more than that left means that something else was meant */
 #define FAINT 1.5             /* mean square below which a first effect, too, must explain most of what there is */
-#define PART_COST 0.03        /* an effect more must better the fit by that to go before */
+#define PART_COST 0.03        /* an effect more must better the fit by that to go before, ... */
+#define FORM_COST 0.003       /* ... a form more of the same by that */
 #define SHORTLIST 10          /* of the candidates that act on the gas; the best variant of each kind besides */
 
 struct candidate {
@@ -91,6 +96,10 @@ static size_t list_candidates(const struct search *search, struct candidate *lis
     return count;
 }
 
+static bool needs_gas(const struct effect_kind *kind) {
+    return effect_has(kind, EFFECT_HOOK_COMMAND) || effect_has(kind, EFFECT_HOOK_GAS);
+}
+
 /* Van der Corput's sequence in a base: well spread starts. */
 static double spread(size_t index, size_t base) {
     double value = 0.0, share = 1.0 / (double)base;
@@ -130,22 +139,23 @@ static size_t place_start(const struct effect_kind *kind, size_t k, struct effec
     if (k == 1 && !sign && !secondary) { /* a small one: some are felt only in proportion near none */
         effect->parameter[0] = kind->parameter[0].none + SMALL_SHARE * (kind->parameter[0].typical - kind->parameter[0].none);
     }
-    return secondary ? STARTS_MAX : 2;
+    return !secondary ? 2 : needs_gas(kind) ? STARTS_MAX : STARTS_CHEAP;
 }
 
 /* --- fits --- */
 
 static double held_out(const struct fit *fit) {
-    return fit->sound ? fit->sums.pressure[1] + fit->sums.tip[1] : INFINITY;
+    return fit->sound ? fit_squares(&fit->sums, 1) : INFINITY;
 }
 
 /* For an order: of two that explain the same, the one with fewer parts goes first. */
 static double rank(const struct fit *fit) {
-    return held_out(fit) * (1.0 + PART_COST * (double)fit->model.count);
+    return held_out(fit) *
+           (1.0 + PART_COST * (double)gap_model_kinds(&fit->model) + FORM_COST * (double)fit->model.count);
 }
 
 static double held_out_count(const struct fit *fit) {
-    return fit->sums.pressure_count[1] + fit->sums.tip_count[1];
+    return fit_count(&fit->sums, 1);
 }
 
 static void add_effect(struct gap_model *model, const struct effect *effect) {
@@ -173,8 +183,8 @@ static void screen(struct fitter *fitter, const struct gap_data *data, const str
             effect.form = form;
             add_effect(&fit.model, &effect);
         }
-        fitter_run(fitter, &fit, SCREEN_ROUNDS, true);
-        const double mine = fit.sums.pressure[0] + fit.sums.tip[0], least = best->sums.pressure[0] + best->sums.tip[0];
+        fitter_run(fitter, &fit, needs_gas(candidate->kind) ? SCREEN_ROUNDS : SCREEN_ROUNDS_CHEAP, true);
+        const double mine = fit_squares(&fit.sums, 0), least = fit_squares(&best->sums, 0);
         if (fit.sound && (!best->sound || mine < least)) {
             *best = fit;
         }
@@ -249,7 +259,7 @@ static void shortlist(struct search *search, struct crew *crew, const struct can
 #pragma omp parallel for schedule(dynamic, 1) num_threads(crew->count)
     for (size_t i = 0; i < count; i++) {
         const struct effect_kind *kind = list[i].kind;
-        const bool on_gas = effect_has(kind, EFFECT_HOOK_COMMAND) || effect_has(kind, EFFECT_HOOK_GAS);
+        const bool on_gas = needs_gas(kind);
         if (!on_gas || (i > 0 && list[i - 1].kind == kind && list[i - 1].form == list[i].form)) {
             continue;
         }
@@ -275,7 +285,7 @@ static void shortlist(struct search *search, struct crew *crew, const struct can
             above += more;
             own_above += more && list[j].kind == kind;
         }
-        const bool on_gas = effect_has(kind, EFFECT_HOOK_COMMAND) || effect_has(kind, EFFECT_HOOK_GAS);
+        const bool on_gas = needs_gas(kind);
         wanted[i] = !on_gas || above < SHORTLIST || own_above == 0;
     }
     free(base_residual);
@@ -307,6 +317,42 @@ static size_t screen_all(struct search *search, struct crew *crew, const struct 
     return kept;
 }
 
+/* Keeps those worth a closer fit, best first: of each kind a few, and of those that are dear to replay a few. */
+static size_t choose(struct fit **order, size_t count) {
+    size_t kept = 0, dear = 0;
+    for (size_t i = 0; i < count; i++) {
+        const struct effect_kind *kind = order[i]->model.effect[order[i]->model.count - 1].kind;
+        size_t same = 0;
+        for (size_t j = 0; j < kept; j++) {
+            same += order[j]->model.effect[order[j]->model.count - 1].kind == kind;
+        }
+        if (same < REFINED_KIND_MAX && (!needs_gas(kind) || dear < REFINED_GAS_MAX)) {
+            dear += needs_gas(kind);
+            order[kept++] = order[i];
+        }
+    }
+    return kept;
+}
+
+/* A base tells of other stiffnesses and supplies to first order. The best are fitted again from where they stand. */
+static void settle(struct search *search, struct crew *crew, struct fit **order, size_t count) {
+    const size_t most = count < SETTLED_MAX ? count : SETTLED_MAX;
+#pragma omp parallel for schedule(dynamic, 1) num_threads(crew->count)
+    for (size_t i = 0; i < most; i++) {
+        struct fit_base base;
+        struct fitter fitter;
+        if (stopped(search) || !fit_base_open(&base, &search->replay, &search->coarse, &order[i]->model)) {
+            continue;
+        }
+        if (fitter_open(&fitter, &base)) {
+            fitter_run(&fitter, order[i], SETTLE_ROUNDS, true);
+            fitter_close(&fitter);
+        }
+        fit_base_close(&base);
+    }
+    qsort(order, count, sizeof *order, by_held_out); // NOLINT(bugprone-sizeof-expression): pointers are sorted
+}
+
 static void refine(struct search *search, struct crew *crew, struct fit **order, size_t count, size_t step) {
 #pragma omp parallel for schedule(dynamic, 1) num_threads(crew->count)
     for (size_t i = 0; i < count; i++) {
@@ -315,6 +361,7 @@ static void refine(struct search *search, struct crew *crew, struct fit **order,
         }
     }
     qsort(order, count, sizeof *order, by_held_out); // NOLINT(bugprone-sizeof-expression): pointers are sorted
+    settle(search, crew, order, count);
     for (size_t i = 0; i < count && search->trials < SEARCH_TRIED_MAX; i++) {
         search->trial[search->trials++] = (struct search_trial){*order[i], step};
     }
@@ -325,12 +372,31 @@ static double structure(const struct fit *fit) {
     return fmax(fit_structure(&fit->sums, 1), 0.0);
 }
 
-/* Does the second explain so much more that its effect has earned its place? A first one must take off much; a further one
- * must be the rest of the explanation, not polish on a form that only nearly fits. */
+/* Does the second explain so much more that its effect may have a place? */
 static bool is_better(const struct fit *before, const struct fit *after) {
     const double gain = held_out(before) - held_out(after);
     const double noise = fmax(held_out(after) / held_out_count(after), 0.2);
-    return gain > GAIN_SHARE * held_out(before) && gain > GAIN_SIGMA * noise;
+    const double worth = fmin(GAIN_SHARE * held_out(before), COMPLETING_SHARE * structure(before) * held_out_count(before));
+    return gain > worth && gain > GAIN_SIGMA * noise;
+}
+
+/* Is there more left, in pressures or at the tip, than the noise and than what the form of the right effects may be off by? */
+static bool is_left(const struct search *search, const struct fit *fit, enum fit_group group) {
+    const double all = fit_structure_of(&search->recalibrated.sums, 1, group);
+    return fit_structure_of(&fit->sums, 1, group) > fmax(STRUCTURE_LEAST, POLISH_SHARE * all);
+}
+
+/* A further effect must be the rest of the explanation, of the pressures or of the tip; not polish on a form that only nearly
+ * fits. */
+static bool completes(const struct search *search, const struct fit *before, const struct fit *after) {
+    bool any = false;
+    for (int g = 0; g < FIT_GROUPS; g++) {
+        const enum fit_group group = (enum fit_group)g;
+        const double left = fit_structure_of(&before->sums, 1, group);
+        any = any || (is_left(search, before, group) &&
+                      fit_structure_of(&after->sums, 1, group) < (1.0 - COMPLETING_SHARE) * left);
+    }
+    return any;
 }
 
 /* The same kind twice, though its forms are alternatives and do not add up. */
@@ -347,7 +413,6 @@ static bool repeats_kind(const struct gap_model *model) {
 }
 
 static bool earns_place(const struct search *search, const struct fit *before, const struct fit *after) {
-    const bool completes = structure(after) < (1.0 - COMPLETING_SHARE) * structure(before);
     if (before->model.count == 0) {
         const bool all_of_it = structure(after) < FAINT_LEFT * structure(before);
         return is_better(before, after) && (all_of_it || structure(before) > FAINT);
@@ -357,13 +422,29 @@ static bool earns_place(const struct search *search, const struct fit *before, c
     if (adds && gap_model_kinds(&after->model) <= gap_model_kinds(&before->model) && !repeats_kind(&after->model)) {
         return is_better(before, after); /* more of the same kind */
     }
-    const bool was_polish = structure(before) < POLISH_SHARE * structure(&search->recalibrated);
-    return is_better(before, after) && completes && !was_polish && !repeats_kind(&after->model);
+    return is_better(before, after) && completes(search, before, after) && !repeats_kind(&after->model);
 }
 
-/* Is what the best model leaves more than noise? */
+/* Is what the model leaves more than noise? */
 static bool is_structured(const struct fit *fit) {
-    return structure(fit) > STRUCTURE_LEAST;
+    return fit_structure_of(&fit->sums, 1, FIT_PRESSURE) > STRUCTURE_LEAST ||
+           fit_structure_of(&fit->sums, 1, FIT_TIP) > STRUCTURE_LEAST;
+}
+
+/* What the recalibrated model leaves under the present smoothing and weights, by which the rest is judged. */
+static bool compare_again(struct search *search) {
+    struct fit_base base;
+    struct fitter fitter;
+    bool sound = fit_base_open(&base, &search->replay, NULL, &search->recalibrated.model);
+    if (sound) {
+        sound = fitter_open(&fitter, &base);
+        if (sound) {
+            fitter_run(&fitter, &search->recalibrated, 0, false);
+            fitter_close(&fitter);
+        }
+        fit_base_close(&base);
+    }
+    return sound;
 }
 
 /* Fit both scales; smoothing and weights follow the model that comes out. */
@@ -386,7 +467,7 @@ static bool recalibrate(struct search *search, struct fit *fit, bool fit_nominal
     }
     replay_state_close(&state, &search->replay);
     replay_follow(&search->coarse, &search->replay);
-    return sound;
+    return sound && (fit != &search->best || compare_again(search));
 }
 
 /* When did each effect set in? Tried on a grid, kept where it explains more. */
@@ -471,9 +552,10 @@ static bool add_one(struct search *search, struct workspace *room, size_t step) 
     struct crew crew = {NULL, 0};
     struct fit next = search->best;
     bool found = false;
+    search->before[step] = search->best;
     if (fit_base_open(&base, &search->replay, &search->coarse, &search->best.model) && crew_open(&crew, search, &base)) {
         size_t count = screen_all(search, &crew, &search->best.model, room->list, room->candidates, room->fits, room->order);
-        count = count < REFINED_MAX ? count : REFINED_MAX;
+        count = choose(room->order, count);
         refine(search, &crew, room->order, count, step);
         for (size_t i = 0; i < count && !found; i++) {
             found = earns_place(search, &search->best, room->order[i]);
@@ -626,12 +708,11 @@ bool search_run(struct search *search, const struct gap_data *data, const struct
         sound = take_repeats(search);
     }
     const bool faint = structure(&search->best) < FAINT && all_have_duties(data);
-    for (size_t step = search->best.model.count; step < EFFECTS_MOST && sound && !stopped(search) && !faint; step++) {
+    for (size_t step = search->best.model.count; step < SEARCH_STEPS_MAX && sound && !stopped(search) && !faint; step++) {
         if (search->best.model.count + 3 > GAP_EFFECTS_MAX) {
             break;
         }
-        const bool polished = structure(&search->best) < POLISH_SHARE * structure(&search->recalibrated);
-        if (step > 0 && (polished || !is_structured(&search->best))) {
+        if (step > 0 && !is_left(search, &search->best, FIT_PRESSURE) && !is_left(search, &search->best, FIT_TIP)) {
             break;
         }
         if (!add_one(search, room, step)) {

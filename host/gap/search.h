@@ -9,6 +9,7 @@
 
 #define SEARCH_CANDIDATES_MAX 160
 #define SEARCH_TRIED_MAX 512
+#define SEARCH_STEPS_MAX 3 /* effects on one module at once */
 
 struct search_options {
     const char *const *without; /* names that are not tried */
@@ -34,6 +35,7 @@ struct search {
     struct fit recalibrated; /* stiffness and supply fitted */
     struct fit best;         /* with the effects that earn their place; the recalibrated one where none does */
     struct fit everything;   /* the best one's parameters from all blocks, held-out ones too */
+    struct fit before[SEARCH_STEPS_MAX]; /* the model that the trials of a step went on from, under the weights of that time */
     size_t trials;
     struct search_trial trial[SEARCH_TRIED_MAX]; /* refined ones of all steps */
     bool interrupted;

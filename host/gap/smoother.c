@@ -2,6 +2,7 @@
 
 #include <math.h>
 #include <stdlib.h>
+#include <string.h>
 
 #define PRIOR_VARIANCE 1e8 /* of a level before anything was seen: (10 kPa)^2 */
 #define CHOICES 11
@@ -42,6 +43,15 @@ static double correct(struct belief *belief, double observed, double variance) {
 
 static struct belief prior(const struct smoother *smoother) {
     return (struct belief){.ll = PRIOR_VARIANCE, .ss = smoother->swing > 0.0 ? PRIOR_VARIANCE : 0.0};
+}
+
+/* Of a level that is zero throughout. */
+static double likelihood_of_noise(const double *observed, const double *variance, size_t count) {
+    double sum = 0.0;
+    for (size_t i = 0; i < count; i++) {
+        sum -= isfinite(variance[i]) ? 0.5 * (log(variance[i]) + observed[i] * observed[i] / variance[i]) : 0.0;
+    }
+    return sum;
 }
 
 static double likelihood(const struct smoother *smoother, const double *observed, const double *variance, size_t count) {
@@ -117,21 +127,29 @@ static bool smooth(const struct smoother *smoother, const double *observed, cons
 
 bool smoother_run(const struct smoother *smoother, const double *observed, const double *variance, size_t count,
                   double *level) {
+    if (smoother->absent) {
+        memset(level, 0, count * sizeof *level);
+        return true;
+    }
     return smooth(smoother, observed, variance, count, level, NULL);
 }
 
 bool smoother_fit(struct smoother *smoother, const double *observed, const double *variance, size_t count, bool rigid,
                   bool with_slope) {
-    struct smoother best = {0.0, 0.0, 0.0};
+    struct smoother best = {.absent = false};
     double most = with_slope ? -INFINITY : likelihood(&best, observed, variance, count);
     double drift = CHOICE_FIRST;
     for (int i = 0; i < CHOICES && !rigid; i++, drift *= CHOICE_FACTOR) {
-        const struct smoother trial = {with_slope ? 0.0 : drift, with_slope ? drift : 0.0, 0.0};
+        const struct smoother trial = {.drift = with_slope ? 0.0 : drift, .swing = with_slope ? drift : 0.0};
         const double value = likelihood(&trial, observed, variance, count);
         if (value > most) {
             most = value;
             best = trial;
         }
+    }
+    if (!with_slope && likelihood_of_noise(observed, variance, count) >= most) {
+        *smoother = (struct smoother){.absent = true};
+        return true;
     }
     double *level = malloc((count + 1) * sizeof *level);
     const bool done = level != NULL && smooth(&best, observed, variance, count, level, &best.spread);

@@ -7,14 +7,26 @@ enum { MASS, ANGLE, AZIMUTH };
 
 #define GRAVITY_MPS2 9.80665
 
-static void bend(double *state, const double *parameter, struct effect_signals *signals) {
-    (void)state;
+static void weigh(const double *parameter, const struct effect_signals *signals, struct body_weight *weight) {
     const struct bend_table_module *module = &signals->table->module;
-    struct body_weight weight = {.end_n = parameter[MASS] * GRAVITY_MPS2,
-                                 .end_beyond_m = body_distal_straight_m(module, signals->shape) +
-                                                 (double)module->cap_distal_m};
-    body_down(parameter[ANGLE], parameter[AZIMUTH], weight.down);
+    *weight = (struct body_weight){
+        .end_n = parameter[MASS] * GRAVITY_MPS2,
+        .end_beyond_m = body_distal_straight_m(module, signals->shape) + (double)module->cap_distal_m};
+    body_down(parameter[ANGLE], parameter[AZIMUTH], weight->down);
+}
+
+static void bend(double *state, const double *parameter, struct effect_signals *signals) {
+    struct body_weight weight;
+    (void)state;
+    weigh(parameter, signals, &weight);
     body_bend_under(signals->table, signals->stiffness_scale, &weight, signals->shape);
+}
+
+static void sag(double *state, const double *parameter, struct effect_signals *signals) {
+    struct body_weight weight;
+    (void)state;
+    weigh(parameter, signals, &weight);
+    body_sag_further(signals->table, signals->stiffness_scale, &weight, signals->shape, signals->pose);
 }
 
 static const struct effect_kind tip_payload = {
@@ -29,6 +41,7 @@ static const struct effect_kind tip_payload = {
     .parameter = {[MASS] = {"mass", "kg", 0.0, 0.1, 0.01, 0.0},
                   [ANGLE] = {"angle", "rad", 0.0, M_PI, 0.0, NAN},
                   [AZIMUTH] = {"azimuth", "rad", -M_PI, M_PI, 0.0, NAN}},
-    .shape = bend};
+    .shape = bend,
+    .pose = sag};
 
 EFFECT_REGISTER(tip_payload);
