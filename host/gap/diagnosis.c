@@ -9,7 +9,7 @@
 #define DEGREES (180.0 / M_PI)
 #define NINETY_PERCENT 1.645
 /* A gap whose structure is below this share of the noise floor's square is none. */
-#define STRUCTURE_NONE 0.2
+#define STRUCTURE_NONE 0.3
 /* Recalibration is the answer where it leaves no more than that, or this share of what was there. */
 #define RECALIBRATED_SHARE 0.05
 /* Catalogue effects must close this share of the structured gap, or the gap is of an unknown kind. */
@@ -17,13 +17,10 @@
 #define CLOSED_LEAST_BY_MANY 0.975 /* by several: together they can bend to much that they are not */
 /* What forms that only nearly fit do to a parameter, as a share of the effect's size: seen against effects of other forms. */
 #define FORM_SHARE 0.025
-/* A trial this much worse than the best is e times less believed: a share of the gap, for what the form of the right effect may
- * be off by; as much again as the best leaves, by which its form is seen to be off; and what noise makes. */
-#define BELIEF_SHARE 0.002
-#define BELIEF_NOISE 10.0
+#define BY_CHANCE_SURE 0.95 /* repeats are seen as such */
 #define GROUP_LEAST 0.15 /* belief that puts a name into the group */
 #define SLUGGISH_SHARE 0.7
-#define SURE 0.60        /* belief above which one name is the verdict */
+#define SURE 0.65        /* belief above which one name is the verdict */
 #define MOVES_LEAST_PA 1500.0 /* a recording in which no pressure moves by more says nothing */
 #define FLOOR_DOUBTFUL 10.0    /* neighbours differ by that many times the sensor's noise */
 #define CHUNK_S 2.5      /* of the bootstrap */
@@ -354,137 +351,30 @@ static bool measure_gaps(struct diagnosis *diagnosis, struct search *search) {
 
 /* --- which --- */
 
-static double held_out(const struct fit *fit) {
-    return fit_squares(&fit->sums, 1);
+static void add_name(struct diagnosis *diagnosis, const char *name, double probability) {
+    size_t at = diagnosis->group;
+    for (size_t i = 0; i < diagnosis->group; i++) {
+        if (strcmp(diagnosis->group_name[i], name) == 0) {
+            return;
+        }
+    }
+    if (at == DIAGNOSIS_NAMES_MAX) {
+        return;
+    }
+    diagnosis->group++;
+    for (; at > 0 && diagnosis->group_probability[at - 1] < probability; at--) {
+        diagnosis->group_name[at] = diagnosis->group_name[at - 1];
+        diagnosis->group_probability[at] = diagnosis->group_probability[at - 1];
+    }
+    diagnosis->group_name[at] = name;
+    diagnosis->group_probability[at] = probability;
 }
 
-static bool names_kind(const struct gap_model *model, const struct effect_kind *kind) {
-    for (size_t e = 0; e < model->count; e++) {
-        if (model->effect[e].kind == kind) {
-            return true;
+static void name_group(struct diagnosis *diagnosis, const struct rivals *rivals) {
+    for (size_t i = 0; i < rivals->count; i++) {
+        if (rivals->rival[i].belief >= GROUP_LEAST) {
+            add_name(diagnosis, rivals->rival[i].kind->name, rivals->rival[i].belief);
         }
-    }
-    return false;
-}
-
-/* The trial's effect that the rest of the best model does not have; NULL: none, or the rest is not all there. */
-static const struct effect *own_effect(const struct fit *fit, const struct gap_model *rest) {
-    const struct effect *own = NULL;
-    size_t others = 0;
-    for (size_t e = 0; e < fit->model.count; e++) {
-        const bool of_rest = names_kind(rest, fit->model.effect[e].kind);
-        others += of_rest;
-        own = !of_rest && own == NULL ? &fit->model.effect[e] : own;
-    }
-    return others < rest->count ? NULL : own;
-}
-
-static void list_alternatives(struct diagnosis *diagnosis, const struct search *search, size_t step,
-                              const struct gap_model *rest, const double *belief, const struct effect_kind *const *kinds,
-                              size_t count) {
-    diagnosis->alternatives = 0;
-    for (size_t t = 0; t < search->trials; t++) {
-        const struct fit *fit = &search->trial[t].fit;
-        const struct effect *own = search->trial[t].step == step && fit->sound ? own_effect(fit, rest) : NULL;
-        if (own == NULL) {
-            continue;
-        }
-        struct diagnosis_alternative entry = {fit, own, 0.0, fmax(fit_structure(&fit->sums, 1), 0.0)};
-        for (size_t i = 0; i < count; i++) {
-            entry.probability = kinds[i] == own->kind ? belief[i] : entry.probability;
-        }
-        size_t at = 0;
-        while (at < diagnosis->alternatives && diagnosis->alternative[at].effect->kind != own->kind) {
-            at++;
-        }
-        if (at < diagnosis->alternatives && held_out(diagnosis->alternative[at].fit) <= held_out(fit)) {
-            continue;
-        }
-        at = at < diagnosis->alternatives ? at : diagnosis->alternatives;
-        if (at == DIAGNOSIS_NAMES_MAX) {
-            at--;
-            if (held_out(diagnosis->alternative[at].fit) <= held_out(fit)) {
-                continue;
-            }
-        }
-        diagnosis->alternatives = at + 1 > diagnosis->alternatives ? at + 1 : diagnosis->alternatives;
-        for (; at > 0 && held_out(diagnosis->alternative[at - 1].fit) > held_out(fit); at--) {
-            diagnosis->alternative[at] = diagnosis->alternative[at - 1];
-        }
-        diagnosis->alternative[at] = entry;
-    }
-}
-
-/* Belief in each kind on top of the `rest` of the best model: the trials of its step, each kind by its best. */
-static void weigh_kinds(const struct search *search, size_t step, double *belief, const struct effect_kind **kinds,
-                        size_t *count, const struct gap_model *rest, const struct effect_kind *own_kind) {
-    double best = INFINITY, excess = 0.0;
-    *count = 0;
-    for (size_t t = 0; t < search->trials; t++) {
-        const struct search_trial *trial = &search->trial[t];
-        if (trial->step != step || !trial->fit.sound) {
-            continue;
-        }
-        const struct effect *effect = own_effect(&trial->fit, rest);
-        if (effect == NULL) {
-            continue;
-        }
-        const struct effect_kind *own = effect->kind;
-        const double cost = held_out(&trial->fit);
-        size_t at = 0;
-        while (at < *count && kinds[at] != own) {
-            at++;
-        }
-        if (at == *count && *count < SEARCH_CANDIDATES_MAX) {
-            kinds[(*count)++] = own;
-            belief[at] = cost;
-        } else if (at < *count) {
-            belief[at] = fmin(belief[at], cost);
-        }
-        if (cost < best) {
-            best = cost;
-            excess = fit_structure(&trial->fit.sums, 1) * fit_count(&trial->fit.sums, 1);
-        }
-    }
-    if (gap_model_kinds(&search->best.model) == step + 1) {
-        /* the best model itself: later steps may have found it */
-        size_t at = 0;
-        while (at < *count && kinds[at] != own_kind) {
-            at++;
-        }
-        if (at == *count && *count < SEARCH_CANDIDATES_MAX) {
-            kinds[(*count)++] = own_kind;
-            belief[at] = INFINITY;
-        }
-        belief[at] = fmin(belief[at], held_out(&search->best));
-        best = fmin(best, belief[at]);
-    }
-    const double before = step < SEARCH_STEPS_MAX ? held_out(&search->before[step]) : best;
-    const double noise = best / fmax(fit_count(&search->best.sums, 1), 1.0);
-    const double scale = BELIEF_SHARE * fmax(before - best, 0.0) + excess + BELIEF_NOISE * noise;
-    double sum = 0.0;
-    for (size_t i = 0; i < *count; i++) {
-        belief[i] = exp(-(belief[i] - best) / scale);
-        sum += belief[i];
-    }
-    for (size_t i = 0; i < *count; i++) {
-        belief[i] /= sum;
-    }
-}
-
-static void name_group(struct diagnosis *diagnosis, const double *belief, const struct effect_kind *const *kinds,
-                       size_t count) {
-    for (size_t i = 0; i < count; i++) {
-        if (belief[i] < GROUP_LEAST || diagnosis->group == DIAGNOSIS_NAMES_MAX) {
-            continue;
-        }
-        size_t at = diagnosis->group++;
-        for (; at > 0 && diagnosis->group_probability[at - 1] < belief[i]; at--) {
-            diagnosis->group_name[at] = diagnosis->group_name[at - 1];
-            diagnosis->group_probability[at] = diagnosis->group_probability[at - 1];
-        }
-        diagnosis->group_name[at] = kinds[i]->name;
-        diagnosis->group_probability[at] = belief[i];
     }
 }
 
@@ -525,54 +415,69 @@ static void take_effects(struct diagnosis *diagnosis, const struct search *searc
     }
 }
 
-/* The model without the effect at `place` and all that is part of it. */
-static void leave_out(const struct gap_model *model, size_t place, struct gap_model *rest) {
-    const struct effect_kind *kind = model->effect[place].kind;
-    const bool bends = strcmp(kind->name, "tip_distortion") == 0;
-    *rest = (struct gap_model){.stiffness_scale = model->stiffness_scale, .supply_scale = model->supply_scale};
-    for (size_t e = 0; e < model->count; e++) {
-        if (model->effect[e].kind != kind && !(bends && gap_model_is_part(model, e))) {
-            rest->effect[rest->count++] = model->effect[e];
+/* Each kind alone, by its best. */
+static void list_single_trials(struct diagnosis *diagnosis, const struct search *search) {
+    for (size_t t = 0; t < search->trials; t++) {
+        const struct fit *fit = &search->trial[t].fit;
+        if (search->trial[t].step != 0 || !fit->sound || gap_model_kinds(&fit->model) != 1) {
+            continue;
         }
+        struct diagnosis_alternative *list = diagnosis->alternative;
+        const struct diagnosis_alternative entry = {&fit->model.effect[0], 0.0, fit_structure(&fit->sums, 1)};
+        size_t at = 0;
+        while (at < diagnosis->alternatives && list[at].effect->kind != entry.effect->kind) {
+            at++;
+        }
+        const bool fresh = at == diagnosis->alternatives, full = at == DIAGNOSIS_NAMES_MAX;
+        at -= full;
+        if ((!fresh || full) && list[at].structure <= entry.structure) {
+            continue;
+        }
+        diagnosis->alternatives += fresh && !full;
+        for (; at > 0 && list[at - 1].structure > entry.structure; at--) {
+            list[at] = list[at - 1];
+        }
+        list[at] = entry;
     }
 }
 
-static void add_name(struct diagnosis *diagnosis, const char *name, double probability) {
-    if (diagnosis->group < DIAGNOSIS_NAMES_MAX) {
-        diagnosis->group_name[diagnosis->group] = name;
-        diagnosis->group_probability[diagnosis->group++] = probability;
+static void list_rivals(struct diagnosis *diagnosis, const struct rivals *rivals) {
+    diagnosis->alternatives = 0;
+    for (size_t i = 0; i < rivals->count && i < DIAGNOSIS_NAMES_MAX; i++) {
+        const struct rival *rival = &rivals->rival[i];
+        diagnosis->alternative[diagnosis->alternatives++] =
+            (struct diagnosis_alternative){&rival->effect, rival->belief, fit_structure(&rival->fit.sums, 1)};
     }
+}
+
+static void believe_effect(struct diagnosis *diagnosis, struct diagnosis_effect *effect, const struct rivals *rivals) {
+    effect->probability = 0.0;
+    for (size_t i = 0; i < rivals->count; i++) {
+        if (rivals->rival[i].kind == effect->kind) {
+            effect->probability = effect->kind->by_chance ? BY_CHANCE_SURE : rivals->rival[i].belief;
+        }
+    }
+    if (effect->probability < SURE) {
+        name_group(diagnosis, rivals);
+    }
+    /* on one chamber a narrow line does just what a sluggish valve does; the valve is the likelier */
+    if (strcmp(effect->kind->name, "valve_sluggish") == 0) {
+        effect->probability *= SLUGGISH_SHARE;
+        add_name(diagnosis, "valve_sluggish", effect->probability);
+        add_name(diagnosis, "line_resistance", 1.0 - SLUGGISH_SHARE);
+    }
+    list_rivals(diagnosis, rivals);
 }
 
 static void believe(struct diagnosis *diagnosis, const struct search *search) {
-    double belief[SEARCH_CANDIDATES_MAX];
-    const struct effect_kind *kinds[SEARCH_CANDIDATES_MAX];
-    size_t count = 0;
     if (diagnosis->effects == 0) {
-        const struct gap_model none = {.count = 0};
-        weigh_kinds(search, 0, belief, kinds, &count, &none, NULL);
-        list_alternatives(diagnosis, search, 0, &none, belief, kinds, count);
+        list_single_trials(diagnosis, search);
     }
     for (size_t e = 0; e < diagnosis->effects; e++) {
-        struct gap_model rest;
-        leave_out(&search->best.model, diagnosis->effect[e].place, &rest);
-        weigh_kinds(search, gap_model_kinds(&rest), belief, kinds, &count, &rest, diagnosis->effect[e].kind);
-        if (e + 1 == diagnosis->effects) {
-            list_alternatives(diagnosis, search, gap_model_kinds(&rest), &rest, belief, kinds, count);
-        }
-        diagnosis->effect[e].probability = count == 0 || diagnosis->effect[e].kind->by_chance ? 0.95 : 0.0;
-        for (size_t i = 0; i < count; i++) {
-            if (kinds[i] == diagnosis->effect[e].kind && !kinds[i]->by_chance) {
-                diagnosis->effect[e].probability = belief[i];
+        for (size_t r = 0; r < search->rivals_count; r++) {
+            if (search->rivals[r].place == diagnosis->effect[e].place) {
+                believe_effect(diagnosis, &diagnosis->effect[e], &search->rivals[r]);
             }
-        }
-        if (diagnosis->effects == 1 || diagnosis->effect[e].probability < SURE) {
-            name_group(diagnosis, belief, kinds, count);
-        }
-        /* on one chamber a narrow line does just what a sluggish valve does; the valve is the likelier */
-        if (strcmp(diagnosis->effect[e].kind->name, "valve_sluggish") == 0) {
-            diagnosis->effect[e].probability *= SLUGGISH_SHARE;
-            add_name(diagnosis, "line_resistance", 1.0 - SLUGGISH_SHARE);
         }
     }
     diagnosis->group = diagnosis->group > 1 ? diagnosis->group : 0;
@@ -632,7 +537,7 @@ static void decide(struct diagnosis *diagnosis, const struct search *search) {
         return;
     }
     if (search->best.model.count == 0) {
-        if (recalibrated > fmax(STRUCTURE_NONE, RECALIBRATED_SHARE * before)) {
+        if (fmin(before, recalibrated) > STRUCTURE_NONE && recalibrated > RECALIBRATED_SHARE * before) {
             diagnosis->verdict = GAP_UNKNOWN;
         } else {
             diagnosis->verdict = before > fmax(STRUCTURE_NONE, 2.0 * recalibrated) ? GAP_RECALIBRATE : GAP_NONE;

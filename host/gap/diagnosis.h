@@ -47,9 +47,8 @@ struct diagnosis_gap {
     double floor;
 };
 
-/* What was tried in place of the best model's last effect, each kind by its best: on which the verdict rests. */
+/* What else was tried, each kind by its best: in place of the last effect, or alone where the verdict names none. */
 struct diagnosis_alternative {
-    const struct fit *fit;
     const struct effect *effect;
     double probability;
     double structure; /* left, in units of the noise's mean square */

@@ -9,6 +9,8 @@
 #define STIFFNESS_PRIOR 0.5      /* standard deviation of its logarithm: only where nothing else tells */
 #define SUPPLY_PRIOR 0.2
 #define DAMPING_FIRST 1e-3
+#define REBASES 4
+#define MOVED_LITTLE 1e-3         /* of the nominal scales: a base tells of that exactly enough */
 #define ENOUGH 2e-4              /* relative change of the sum of squares that is worth no further step */
 
 static bool acts_on_gas(const struct effect_kind *kind) {
@@ -508,4 +510,25 @@ void fitter_run(struct fitter *fitter, struct fit *fit, int rounds, bool fit_nom
     }
     sum_up(fitter, fitter->residual, &fit->sums);
     fit->sound = isfinite(cost);
+}
+
+bool fit_rebased(const struct replay *fine, const struct replay *coarse, struct fit *fit, int rounds) {
+    bool sound = true, moved = true;
+    for (int i = 0; i < REBASES && sound && moved; i++) {
+        struct fit_base base;
+        struct fitter fitter;
+        sound = fit_base_open(&base, fine, coarse, &fit->model);
+        if (!sound) {
+            break;
+        }
+        sound = fitter_open(&fitter, &base);
+        if (sound) {
+            fitter_run(&fitter, fit, rounds, true);
+            fitter_close(&fitter);
+        }
+        moved = fabs(fit->model.stiffness_scale - base.model.stiffness_scale) > MOVED_LITTLE ||
+                fabs(fit->model.supply_scale - base.model.supply_scale) > MOVED_LITTLE;
+        fit_base_close(&base);
+    }
+    return sound;
 }

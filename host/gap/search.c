@@ -339,16 +339,9 @@ static void settle(struct search *search, struct crew *crew, struct fit **order,
     const size_t most = count < SETTLED_MAX ? count : SETTLED_MAX;
 #pragma omp parallel for schedule(dynamic, 1) num_threads(crew->count)
     for (size_t i = 0; i < most; i++) {
-        struct fit_base base;
-        struct fitter fitter;
-        if (stopped(search) || !fit_base_open(&base, &search->replay, &search->coarse, &order[i]->model)) {
-            continue;
+        if (!stopped(search)) {
+            (void)fit_rebased(&search->replay, &search->coarse, order[i], SETTLE_ROUNDS);
         }
-        if (fitter_open(&fitter, &base)) {
-            fitter_run(&fitter, order[i], SETTLE_ROUNDS, true);
-            fitter_close(&fitter);
-        }
-        fit_base_close(&base);
     }
     qsort(order, count, sizeof *order, by_held_out); // NOLINT(bugprone-sizeof-expression): pointers are sorted
 }
@@ -552,7 +545,6 @@ static bool add_one(struct search *search, struct workspace *room, size_t step) 
     struct crew crew = {NULL, 0};
     struct fit next = search->best;
     bool found = false;
-    search->before[step] = search->best;
     if (fit_base_open(&base, &search->replay, &search->coarse, &search->best.model) && crew_open(&crew, search, &base)) {
         size_t count = screen_all(search, &crew, &search->best.model, room->list, room->candidates, room->fits, room->order);
         count = choose(room->order, count);
@@ -726,6 +718,10 @@ bool search_run(struct search *search, const struct gap_data *data, const struct
     if (sound && !stopped(search)) {
         drop_idle(search);
         sound = recalibrate(search, &search->best, true);
+    }
+    if (sound && !stopped(search) && search->best.model.count > 0) {
+        say(search, "rivals", 0, 1);
+        sound = rivals_find(search);
     }
     sound = sound && fit_everything(search);
     search->interrupted = stopped(search);

@@ -6,6 +6,7 @@
 #include <signal.h>
 
 #include "gap/fit.h"
+#include "gap/rivals.h"
 
 #define SEARCH_CANDIDATES_MAX 160
 #define SEARCH_TRIED_MAX 512
@@ -35,9 +36,10 @@ struct search {
     struct fit recalibrated; /* stiffness and supply fitted */
     struct fit best;         /* with the effects that earn their place; the recalibrated one where none does */
     struct fit everything;   /* the best one's parameters from all blocks, held-out ones too */
-    struct fit before[SEARCH_STEPS_MAX]; /* the model that the trials of a step went on from, under the weights of that time */
     size_t trials;
     struct search_trial trial[SEARCH_TRIED_MAX]; /* refined ones of all steps */
+    size_t rivals_count;
+    struct rivals rivals[SEARCH_STEPS_MAX]; /* of each kind that the best model names */
     bool interrupted;
 };
 
