@@ -16,7 +16,7 @@
 #include "sim/chamber.h"
 
 #define EFFECT_PARAMETERS_MAX 3
-#define EFFECT_FORMS_MAX 6
+#define EFFECT_FORMS_MAX 10
 #define EFFECT_STATE_DOUBLES 320
 
 /* Where the effect lies; the words of reports. */

@@ -7,7 +7,7 @@
 #include "sim/effect.h"
 #include "sim/valve.h"
 
-#define PLANT_EFFECTS_MAX 10
+#define PLANT_EFFECTS_MAX 16
 
 struct plant_parameters {
     struct gas_parameters gas;

@@ -13,8 +13,8 @@
 /* Recalibration is the answer where it leaves no more than that, or this share of what was there. */
 #define RECALIBRATED_SHARE 0.05
 /* Catalogue effects must close this share of the structured gap, or the gap is of an unknown kind. */
-#define CLOSED_LEAST 0.87
-#define CLOSED_LEAST_BY_MANY 0.975 /* by several: together they can bend to much that they are not */
+#define CLOSED_LEAST 0.97
+#define CLOSED_LEAST_BY_MANY 0.98 /* by several: together they can bend to much that they are not */
 /* What forms that only nearly fit do to a parameter, as a share of the effect's size: seen against effects of other forms. */
 #define FORM_SHARE 0.025
 #define BY_CHANCE_SURE 0.95 /* repeats are seen as such */

@@ -4,7 +4,7 @@
 
 #include "sim/plant.h"
 
-#define GAP_EFFECTS_MAX 9
+#define GAP_EFFECTS_MAX 13
 #define GAP_PARAMETERS_MAX (2 + GAP_EFFECTS_MAX * EFFECT_PARAMETERS_MAX)
 
 struct gap_model {

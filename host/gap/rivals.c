@@ -36,14 +36,18 @@ static void leave_out(const struct gap_model *model, size_t place, struct gap_mo
     }
 }
 
-/* The trial's first effect of a kind that the rest does not name; NULL: none, or it lacks some of the rest. */
+/* The trial's first effect of a kind that the rest does not name; NULL: none, or several kinds, or it lacks some of the rest. */
 static const struct effect *own_effect(const struct fit *fit, const struct gap_model *rest) {
     const struct effect *own = NULL;
     size_t met = 0;
     for (size_t e = 0; e < fit->model.count; e++) {
-        const bool of_rest = names_kind(rest, fit->model.effect[e].kind);
+        const struct effect *effect = &fit->model.effect[e];
+        const bool of_rest = names_kind(rest, effect->kind);
         met += of_rest;
-        own = !of_rest && own == NULL ? &fit->model.effect[e] : own;
+        if (!of_rest && own != NULL && own->kind != effect->kind) {
+            return NULL;
+        }
+        own = !of_rest && own == NULL ? effect : own;
     }
     return met < rest->count ? NULL : own;
 }
@@ -131,20 +135,30 @@ static int by_belief(const void *a, const void *b) {
     return (x < y) - (x > y);
 }
 
+/* The logarithm of how much less the rival's residuals of one group speak for it than the best one's. */
+static double misfit(const struct fit *rival, const struct fit *without, const struct fit *least, enum fit_group group) {
+    const struct fit_part *own = &rival->sums.part[1][group], *best = &least->sums.part[1][group];
+    const double count = fmax(best->count, 1.0), structure = fit_structure_of(&least->sums, 1, group);
+    const double noise = fmax(best->square / count - structure, 0.1);
+    const double taken_off = fmax(without->sums.part[1][group].square - best->square, 0.0);
+    return (own->square - best->square) / (FORM_SHARE * taken_off + structure * count + NOISE_SQUARES * noise);
+}
+
 static void weigh(struct rivals *rivals, const struct fit *without, const struct fit *best) {
     const struct fit *least = best;
-    double sum = 0.0;
+    double sum = 0.0, most = -INFINITY;
     for (size_t i = 0; i < rivals->count; i++) {
         least = held_out(&rivals->rival[i].fit) < held_out(least) ? &rivals->rival[i].fit : least;
     }
-    const double count = fmax(fit_count(&least->sums, 1), 1.0);
-    const double noise = fmax(fit_mean_square(&least->sums, 1) - fit_structure(&least->sums, 1), 0.1);
-    const double scale = FORM_SHARE * fmax(held_out(without) - held_out(least), 0.0) + fit_structure(&least->sums, 1) * count +
-                         NOISE_SQUARES * noise;
     for (size_t i = 0; i < rivals->count; i++) {
         struct rival *rival = &rivals->rival[i];
-        rival->belief = exp(-(held_out(&rival->fit) - held_out(least)) / scale) / parameters_of(&rival->fit.model, rival->kind);
-        sum += rival->belief;
+        rival->belief = -misfit(&rival->fit, without, least, FIT_PRESSURE) - misfit(&rival->fit, without, least, FIT_TIP) -
+                        0.5 * log(parameters_of(&rival->fit.model, rival->kind));
+        most = fmax(most, rival->belief);
+    }
+    for (size_t i = 0; i < rivals->count; i++) {
+        rivals->rival[i].belief = exp(rivals->rival[i].belief - most);
+        sum += rivals->rival[i].belief;
     }
     for (size_t i = 0; i < rivals->count; i++) {
         rivals->rival[i].belief /= sum;

@@ -19,14 +19,16 @@
 #define PAIRED_MAX 6          /* the best alone, of which all pairs are tried */
 #define GAIN_SHARE 0.03       /* an effect must take off this share of the held-out squares .. */
 #define GAIN_SIGMA 40.0       /* .. and so much that noise does not */
-#define REPEATS_CERTAIN 0.08  /* share of repeated samples that no noise makes */
-#define REPEATS_HELP 0.8      /* of the squares at most may be left once they count as repeats */
+#define REPEATS_CERTAIN 0.04  /* share of repeated samples that no noise makes */
 #define REPEATS_LEAST 0.02    /* share of repeated samples below which none is frozen */
 #define ONSETS 12
+#define LATE_SHARE 0.03       /* of the gap, that an effect with an onset may leave */
 #define ONSET_FINE_S 0.15     /* an onset is not sought closer than that */
 #define COMPLETING_SHARE 0.5  /* of what is left, that a further effect must explain */
-#define POLISH_SHARE 0.002    /* of the gap: less than that is left by any form of the right effect */
-#define STRUCTURE_LEAST 0.15  /* mean square in units of a block's noise that is worth explaining */
+#define POLISH_SHARE 0.025    /* of the gap, in pressures or at the tip: less than that is left by any form of the right effect */
+#define FORM_LEAST 0.0005     /* of the gap: less than that no effect is sought for */
+#define WHOLE_SHARE 0.9       /* of such a small rest, that an effect must explain */
+#define STRUCTURE_LEAST 0.2   /* mean square in units of a block's noise that is worth explaining */
 #define FAINT_LEFT 0.25        /* of a faint gap: more than that left means that something else was meant */
 #define FAINT 1.5             /* mean square below which a first effect, too, must explain most of what there is */
 #define PART_COST 0.03        /* an effect more must better the fit by that to go before, ... */
@@ -162,7 +164,7 @@ static void add_effect(struct gap_model *model, const struct effect *effect) {
     model->effect[model->count++] = *effect;
 }
 
-static void screen(struct fitter *fitter, const struct gap_data *data, const struct gap_model *onto,
+static void screen(struct fitter *fitter, const struct search *search, const struct gap_model *onto,
                    const struct candidate *candidate, struct fit *best) {
     size_t starts = 1;
     *best = (struct fit){.sound = false};
@@ -172,9 +174,10 @@ static void screen(struct fitter *fitter, const struct gap_data *data, const str
         effect_init(&effect, candidate->kind);
         effect.chamber = candidate->chamber;
         effect.form = candidate->form;
+        effect.onset_s = search->onset_s;
         starts = place_start(candidate->kind, k, &effect);
         if (candidate->kind->by_chance) {
-            effect.parameter[0] = gap_data_repeated_share(data);
+            effect.parameter[0] = gap_data_repeated_share(search->data);
         }
         const bool all_forms = candidate->form > 0 && candidate->form == candidate->kind->forms;
         effect.form = all_forms ? 0 : effect.form;
@@ -270,6 +273,7 @@ static void shortlist(struct search *search, struct crew *crew, const struct can
             effect_init(&effect, kind);
             effect.chamber = 0;
             effect.form = list[i].form;
+            effect.onset_s = search->onset_s;
             starts = place_start(kind, k, &effect);
             fitter_linear(&crew->fitter[omp_get_thread_num()], crew->fitter[0].base, base_residual, &effect, mine);
             for (size_t j = i; j < count && list[j].kind == kind && list[j].form == list[i].form; j++) {
@@ -301,7 +305,7 @@ static size_t screen_all(struct search *search, struct crew *crew, const struct 
     for (size_t i = 0; i < count; i++) {
         fits[i] = (struct fit){.sound = false};
         if (wanted[i] && !stopped(search) && model_has(onto, list[i].kind, list[i].form, list[i].chamber) == 0) {
-            screen(&crew->fitter[omp_get_thread_num()], search->data, onto, &list[i], &fits[i]);
+            screen(&crew->fitter[omp_get_thread_num()], search, onto, &list[i], &fits[i]);
         }
         size_t now;
 #pragma omp atomic capture
@@ -373,21 +377,31 @@ static bool is_better(const struct fit *before, const struct fit *after) {
     return gain > worth && gain > GAIN_SIGMA * noise;
 }
 
-/* Is there more left, in pressures or at the tip, than the noise and than what the form of the right effects may be off by? */
-static bool is_left(const struct search *search, const struct fit *fit, enum fit_group group) {
+/* Is there more left, in pressures or at the tip, than the noise and than that share of the gap? */
+static bool is_left(const struct search *search, const struct fit *fit, enum fit_group group, double share) {
     const double all = fit_structure_of(&search->recalibrated.sums, 1, group);
-    return fit_structure_of(&fit->sums, 1, group) > fmax(STRUCTURE_LEAST, POLISH_SHARE * all);
+    return fit_structure_of(&fit->sums, 1, group) > fmax(STRUCTURE_LEAST, share * all);
+}
+
+static bool is_simple(const struct fit *fit) {
+    const struct effect_kind *last = fit->model.effect[fit->model.count - 1].kind;
+    size_t parts = 0;
+    for (size_t e = 0; e < fit->model.count; e++) {
+        parts += fit->model.effect[e].kind == last;
+    }
+    return parts == 1;
 }
 
 /* A further effect must be the rest of the explanation, of the pressures or of the tip; not polish on a form that only nearly
- * fits. */
+ * fits. A small rest may as well be the form: of that, a simple effect must explain nearly all. */
 static bool completes(const struct search *search, const struct fit *before, const struct fit *after) {
+    const struct effect_kind *last = after->model.effect[after->model.count - 1].kind;
     bool any = false;
-    for (int g = 0; g < FIT_GROUPS; g++) {
+    for (int g = gap_effect_upstream(last) ? FIT_PRESSURE : FIT_TIP; g < FIT_GROUPS; g++) {
         const enum fit_group group = (enum fit_group)g;
-        const double left = fit_structure_of(&before->sums, 1, group);
-        any = any || (is_left(search, before, group) &&
-                      fit_structure_of(&after->sums, 1, group) < (1.0 - COMPLETING_SHARE) * left);
+        const double left = fit_structure_of(&before->sums, 1, group), then = fit_structure_of(&after->sums, 1, group);
+        any = any || (is_left(search, before, group, POLISH_SHARE) && then < (1.0 - COMPLETING_SHARE) * left) ||
+              (is_left(search, before, group, FORM_LEAST) && is_simple(after) && then < (1.0 - WHOLE_SHARE) * left);
     }
     return any;
 }
@@ -592,6 +606,9 @@ static void drop_idle(struct search *search) {
         dropped = false;
         for (size_t e = 0; e < search->best.model.count && search->best.model.count > 1; e++) {
             struct fit without = search->best;
+            if (without.model.effect[e].kind->by_chance) {
+                continue; /* seen as such */
+            }
             memmove(&without.model.effect[e], &without.model.effect[e + 1],
                     (without.model.count - e - 1) * sizeof without.model.effect[0]);
             without.model.count--;
@@ -655,22 +672,51 @@ static bool look_closer(struct search *search, struct workspace *room) {
     return sound;
 }
 
-/* Repeated samples are seen as such: no fit has to find them. */
-static bool take_repeats(struct search *search) {
+/* Repeated samples are seen as such: no fit has to find them. They count where the poses are better explained by them: a
+ * log that is written more often than the sensor measures has them too. */
+static bool take_repeats(struct search *search, size_t step) {
     const struct effect_kind *kind = effect_kind_find("tip_freeze");
     const double share = gap_data_repeated_share(search->data);
-    if (kind == NULL || is_without(&search->options, kind->name) || share < REPEATS_CERTAIN) {
+    const bool known = kind == NULL || is_without(&search->options, kind->name) || model_has(&search->best.model, kind, 0, 0) > 0;
+    if (known || share < REPEATS_CERTAIN || search->best.model.count == GAP_EFFECTS_MAX) {
         return true;
     }
     struct effect effect;
-    struct fit with = search->recalibrated;
+    struct fit with = search->best;
     effect_init(&effect, kind);
     effect.parameter[0] = share;
     add_effect(&with.model, &effect);
     const bool sound = recalibrate(search, &with, true);
-    if (sound && held_out(&with) < REPEATS_HELP * held_out(&search->recalibrated)) {
+    const double noise = fmax(held_out(&with) / held_out_count(&with), 0.2);
+    if (sound && held_out(&with) < held_out(&search->best) - GAIN_SIGMA * noise) {
         search->best = with;
-        search->trial[search->trials++] = (struct search_trial){with, 0};
+        search->trial[search->trials++] = (struct search_trial){with, step};
+        return compare_again(search);
+    }
+    return sound && recalibrate(search, &search->best, true);
+}
+
+/* An effect that sets in late is taken for another while candidates act from the start. Where one was found to set in late and
+ * leaves much, all are tried again from its onset on. */
+static bool search_after_onset(struct search *search, struct workspace *room) {
+    const struct fit before = search->best;
+    const double left = structure(&before) / fmax(structure(&search->recalibrated), STRUCTURE_LEAST);
+    const bool late = before.model.count > 0 && before.model.effect[0].onset_s > 0.0;
+    if (!late || left < LATE_SHARE || structure(&before) < STRUCTURE_LEAST || stopped(search)) {
+        return true;
+    }
+    search->onset_s = before.model.effect[0].onset_s;
+    search->best = search->recalibrated;
+    room->singles = 0;
+    const bool found = add_one(search, room, 0);
+    search->onset_s = 0.0;
+    bool sound = true;
+    if (found) {
+        sound = recalibrate(search, &search->best, true);
+    }
+    if (!found || structure(&search->best) > left * fmax(structure(&search->recalibrated), STRUCTURE_LEAST)) {
+        search->best = before;
+        sound = sound && recalibrate(search, &search->best, true);
     }
     return sound;
 }
@@ -697,20 +743,22 @@ bool search_run(struct search *search, const struct gap_data *data, const struct
     search->best = search->recalibrated;
     if (sound) {
         room->candidates = list_candidates(search, room->list);
-        sound = take_repeats(search);
+        sound = take_repeats(search, 0);
     }
     const bool faint = structure(&search->best) < FAINT && all_have_duties(data);
     for (size_t step = search->best.model.count; step < SEARCH_STEPS_MAX && sound && !stopped(search) && !faint; step++) {
         if (search->best.model.count + 3 > GAP_EFFECTS_MAX) {
             break;
         }
-        if (step > 0 && !is_left(search, &search->best, FIT_PRESSURE) && !is_left(search, &search->best, FIT_TIP)) {
+        if (step > 0 && !is_left(search, &search->best, FIT_PRESSURE, FORM_LEAST) &&
+            !is_left(search, &search->best, FIT_TIP, FORM_LEAST)) {
             break;
         }
         if (!add_one(search, room, step)) {
             break;
         }
-        sound = recalibrate(search, &search->best, true);
+        sound = recalibrate(search, &search->best, true) && (step > 0 || search_after_onset(search, room)) &&
+                take_repeats(search, step);
     }
     if (sound && !stopped(search) && search->best.model.count == 0 && all_have_duties(data)) {
         sound = look_closer(search, room);

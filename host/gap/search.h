@@ -38,6 +38,7 @@ struct search {
     struct fit everything;   /* the best one's parameters from all blocks, held-out ones too */
     size_t trials;
     struct search_trial trial[SEARCH_TRIED_MAX]; /* refined ones of all steps */
+    double onset_s; /* before it no candidate acts */
     size_t rivals_count;
     struct rivals rivals[SEARCH_STEPS_MAX]; /* of each kind that the best model names */
     bool interrupted;

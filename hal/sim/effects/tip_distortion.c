@@ -1,13 +1,14 @@
 /* Metal near the field generator bends the field: poses are off by an amount that depends on where the tip is. The lowest
- * terms of a polynomial field (Kindratenko 2000 calibrates with polynomials): position and orientation each by the square of
- * the distance from the module's axis, and in proportion to the distance along x and y, as a field with a slope has it. A
- * real field has all of them: they add up when one adds the effect in several forms. */
+ * terms of a polynomial field (Kindratenko 2000 calibrates with polynomials): position and orientation each in proportion to
+ * the distance along x and y, as a field with a slope has it, by the square of the distance from the module's axis, and by
+ * the two squares that tell directions apart. A real field has all of them: they add up when one adds the effect in several
+ * forms. */
 #include <math.h>
 
 #include "sim/effect.h"
 
 enum { X, Y, Z };
-enum { ROUND, ALONG_X, ALONG_Y, TURN_ROUND, TURN_ALONG_X, TURN_ALONG_Y, FORMS };
+enum { ROUND, ALONG_X, ALONG_Y, SADDLE, DIAGONAL, POSITION_FORMS, FORMS = 2 * POSITION_FORMS };
 
 #define REACH_M 0.040 /* distance from the axis at which the parameters are the error */
 #define TURN_PER_M 10.0 /* rad: what the parameter of an orientation's form means at that distance */
@@ -15,7 +16,19 @@ enum { ROUND, ALONG_X, ALONG_Y, TURN_ROUND, TURN_ALONG_X, TURN_ALONG_Y, FORMS };
 
 static double share_of(const double position_m[3], size_t form) {
     const double x = position_m[0] / REACH_M, y = position_m[1] / REACH_M;
-    return form == ROUND ? x * x + y * y : form == ALONG_X ? x : y;
+    switch (form) {
+    case ALONG_X:
+        return x;
+    case ALONG_Y:
+        return y;
+    case SADDLE:
+        return x * x - y * y;
+    case DIAGONAL:
+        return 2.0 * x * y;
+    case ROUND:
+    default:
+        return x * x + y * y;
+    }
 }
 
 /* Rotation vector `r` in the base frame, times the quaternion `q`. */
@@ -33,8 +46,8 @@ static void turn(const double r[3], double q[4]) {
 static void move(double *state, const double *parameter, struct effect_signals *signals) {
     (void)state;
     double *position_m = signals->pose->position_m;
-    if (signals->form >= TURN_ROUND) {
-        const double share = TURN_PER_M * share_of(position_m, signals->form - TURN_ROUND);
+    if (signals->form >= POSITION_FORMS) {
+        const double share = TURN_PER_M * share_of(position_m, signals->form - POSITION_FORMS);
         const double rotation[3] = {share * parameter[X], share * parameter[Y], share * parameter[Z]};
         turn(rotation, signals->pose->quaternion);
         return;
@@ -55,8 +68,10 @@ static const struct effect_kind tip_distortion = {
     .forms = FORMS,
     .forms_add = true,
     .form_what = {"position, by the square of the distance from the axis", "position, in proportion to x",
-                  "position, in proportion to y", "orientation (10 mrad for 1 mm), by the square of the distance",
-                  "orientation (10 mrad for 1 mm), in proportion to x", "orientation (10 mrad for 1 mm), in proportion to y"},
+                  "position, in proportion to y", "position, by x squared less y squared", "position, by 2 x y",
+                  "orientation (10 mrad for 1 mm), by the square of the distance",
+                  "orientation (10 mrad for 1 mm), in proportion to x", "orientation (10 mrad for 1 mm), in proportion to y",
+                  "orientation (10 mrad for 1 mm), by x squared less y squared", "orientation (10 mrad for 1 mm), by 2 x y"},
     .parameter_count = 3,
     .parameter = {[X] = {"x", "m", -0.02, 0.02, 1e-3, 0.0},
                   [Y] = {"y", "m", -0.02, 0.02, 1e-3, 0.0},
