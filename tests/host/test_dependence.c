@@ -69,6 +69,7 @@ static void find(const char *effect_text, struct dependences *dependences) {
     static struct search search;
     static struct gap_data data;
     struct plant_parameters nominal;
+    struct replay_state state;
     const char *path = log_path;
     char error[512];
     record(effect_text);
@@ -81,6 +82,9 @@ static void find(const char *effect_text, struct dependences *dependences) {
     search.nominal.model = (struct gap_model){.stiffness_scale = 1.0, .supply_scale = 1.0};
     search.recalibrated = search.best = search.nominal;
     assert_true(replay_open(&search.replay, &data, &table.table, &nominal));
+    assert_true(replay_state_open(&state, &search.replay));
+    assert_true(replay_prepare(&search.replay, &search.nominal.model, &state));
+    replay_state_close(&state, &search.replay);
     assert_true(dependence_find(dependences, &search, false));
     replay_close(&search.replay);
     gap_data_free(&data);
