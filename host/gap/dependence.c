@@ -306,6 +306,7 @@ bool dependence_find(struct dependences *dependences, const struct search *searc
     for (size_t model = 0; model < (with_best ? 2u : 1u) && sound; model++) {
         size_t tested = 0;
         make_table(&grid, model, bend_is_angle, &table);
+        table.threads = search->options.threads;
         const size_t count = locate_find(&table, SEED, found, &tested);
         sound = count != SIZE_MAX;
         if (sound) {

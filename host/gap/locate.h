@@ -40,6 +40,7 @@ struct locate_table {
     struct locate_residual residual[LOCATE_RESIDUALS_MAX];
     size_t variables;
     struct locate_variable variable[LOCATE_VARIABLES_MAX];
+    int threads; /* 0: all cores */
 };
 
 struct locate_dependence {
