@@ -385,8 +385,7 @@ size_t locate_find(const struct locate_table *table, uint64_t seed, struct locat
         sound = bins_open(&bins[v], &table->variable[v], table->rows);
     }
     if (sound && table->rows >= ROWS_LEAST) {
-        const int threads = table->threads > 0 ? table->threads : omp_get_max_threads();
-#pragma omp parallel for schedule(dynamic, 1) num_threads(threads)
+#pragma omp parallel for schedule(dynamic, 1) num_threads(table->threads > 0 ? table->threads : omp_get_max_threads())
         for (size_t r = 0; r <= table->residuals; r++) {
             struct locate_dependence *out = own + r * LOCATE_VARIABLES_MAX;
             count[r] = r < table->residuals ? test_residual(table, bins, r, seed, out) : test_chambers(table, seed, out);
