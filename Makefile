@@ -32,11 +32,11 @@ test: setup ## build and run every test (sets up what is missing first)
 	@$(MAKE) --no-print-directory -j$(JOBS) all test-programs
 	@tests/tools/run_tests $(BUILD)
 
-bench: setup ## time an equilibrium, a table and the simulation on this machine
+bench: setup ## time equilibrium, table, simulation and diagnosis on this machine (PART=gap: one part)
 	@$(MAKE) --no-print-directory -j$(JOBS) all bench-programs
 	@tests/tools/bench $(BUILD)
 
-gap-check: setup ## blind check of the diagnosis: data of another plant, truth withheld (FULL=1: four times as many)
+gap-check: setup ## blind check of the diagnosis: data of another plant, truth withheld (FULL=1: four times as many; MPI_RANKS=n)
 	@$(MAKE) --no-print-directory -j$(JOBS) all test-programs
 	@tests/gap/blind/gap_check
 

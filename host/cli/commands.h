@@ -67,8 +67,9 @@ void bus_close(struct bus *bus);
 
 /* Follow `command` for the options' duration, vent, say how it went; returns an exit code. */
 int run_command(const struct bus_options *options, const struct controller_command *command);
-/* "overpressure, command timeout": the faults' or warnings' words into `text`. */
+/* "overpressure, command timeout": the faults' or warnings' words into `text`. A gap between module and model is said with the
+ * stage and the chamber that the gap monitor found. */
 void cli_describe_faults(uint32_t faults, char *text, size_t bytes);
-void cli_describe_warnings(uint32_t warnings, char *text, size_t bytes);
+void cli_describe_warnings(const struct controller_status *status, char *text, size_t bytes);
 
 #endif

@@ -219,10 +219,24 @@ void cli_describe_faults(uint32_t faults, char *text, size_t bytes) {
     }
 }
 
-void cli_describe_warnings(uint32_t warnings, char *text, size_t bytes) {
+static void append_gap(char *text, size_t bytes, const struct gap_monitor_report *gap) {
+    char words[256], chamber[32] = "";
+    if (gap->chamber > 0) {
+        (void)snprintf(chamber, sizeof chamber, "chamber %u, ", gap->chamber);
+    }
+    (void)snprintf(words, sizeof words, "gap between module and model in %s%s", chamber, gap_monitor_stage_text(gap->stage));
+    append(text, bytes, words);
+}
+
+void cli_describe_warnings(const struct controller_status *status, char *text, size_t bytes) {
     *text = '\0';
     for (int w = 0; w < (int)WARNING_COUNT; w++) {
-        if ((warnings & (1u << (unsigned)w)) != 0u) {
+        if ((status->warnings & (1u << (unsigned)w)) == 0u) {
+            continue;
+        }
+        if (w == (int)WARNING_MODEL_GAP && status->gap.stage != GAP_MONITOR_NONE) {
+            append_gap(text, bytes, &status->gap);
+        } else {
             append(text, bytes, supervisor_warning_text((enum supervisor_warning)w));
         }
     }

@@ -165,7 +165,7 @@ static void print_followed(const struct run_summary *summary) {
 
 static void print_health(const struct link_report *last) {
     char words[WORDS_BYTES];
-    cli_describe_warnings(last->status.warnings, words, sizeof words);
+    cli_describe_warnings(&last->status, words, sizeof words);
     printf("warnings  %s\n", words);
     printf("tip       %u samples, %u rejected, lost %u times; commands refused: %u\n", last->status.tip_samples,
            last->status.tip_rejected, last->status.tip_lost_count, last->status.commands_refused);

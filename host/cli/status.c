@@ -6,7 +6,7 @@
 #include "cli/commands.h"
 
 #define DEGREES (180.0 / M_PI)
-#define LISTEN_US 100000
+#define LISTEN_S 0.1 /* unless --for says otherwise */
 #define WORDS_BYTES 512
 
 static error_t parse(int key, char *argument, struct argp_state *state) {
@@ -23,7 +23,9 @@ static error_t parse(int key, char *argument, struct argp_state *state) {
 }
 
 static const struct argp_child children[] = {{&bus_options_parser, 0, NULL, 1}, {0}};
-static const struct argp parser = {NULL, parse, "", "Say what the controller sees and which faults it has.",
+static const struct argp parser = {NULL, parse, "",
+                                   "Say what the controller sees, which faults it has, and where the module does not do what its model "
+                                   "says. It listens for 0.1 s, unless --for says otherwise.",
                                    children, NULL, NULL};
 
 static void print_status(const struct bus *bus, const struct bus_options *options, const struct link_report *report) {
@@ -36,7 +38,7 @@ static void print_status(const struct bus *bus, const struct bus_options *option
     printf("state      %s\n", supervisor_state_name(status->state));
     cli_describe_faults(status->faults, words, sizeof words);
     printf("faults     %s\n", words);
-    cli_describe_warnings(status->warnings, words, sizeof words);
+    cli_describe_warnings(status, words, sizeof words);
     printf("warnings   %s\n", words);
     printf("pressures  %.3f %.3f %.3f kPa, supply %.2f kPa\n", 1e-3 * (double)report->pressure_pa[0],
            1e-3 * (double)report->pressure_pa[1], 1e-3 * (double)report->pressure_pa[2],
@@ -54,6 +56,7 @@ int cli_status(int argc, char **argv) {
     struct bus_options options;
     struct link_report report;
     bus_options_init(&options);
+    options.duration_s = LISTEN_S;
     argp_err_exit_status = EXIT_USAGE;
     if (argp_parse(&parser, argc, argv, 0, NULL, &options) != 0) {
         return EXIT_USAGE;
@@ -69,7 +72,7 @@ int cli_status(int argc, char **argv) {
             bus_close(&bus);
             return program_fail(EXIT_OUTPUT, "the controller on bus %s went away", options.bus);
         }
-    } while (report.time_us < LISTEN_US);
+    } while (1e-6 * (double)report.time_us < options.duration_s);
     print_status(&bus, &options, &report);
     bus_close(&bus);
     return report.status.faults == 0u ? EXIT_OK : EXIT_FAULT;

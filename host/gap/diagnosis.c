@@ -639,5 +639,6 @@ bool diagnosis_conclude(struct diagnosis *diagnosis, struct search *search) {
     }
     doubt_floor(diagnosis, search);
     suggest(diagnosis);
-    return true;
+    return dependence_find(&diagnosis->dependences, search,
+                           diagnosis->verdict == GAP_UNKNOWN && search->best.model.count > 0);
 }

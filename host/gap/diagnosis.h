@@ -2,6 +2,7 @@
 #ifndef TRIBEND_GAP_DIAGNOSIS_H
 #define TRIBEND_GAP_DIAGNOSIS_H
 
+#include "gap/dependence.h"
 #include "gap/search.h"
 
 #define DIAGNOSIS_NAMES_MAX 8
@@ -74,6 +75,7 @@ struct diagnosis {
     double structure[3];    /* share of noise floor squared that is left: nominal, recalibrated, best */
     const char *rest_stage; /* where the best model leaves most */
     bool rest_chamber[3];
+    struct dependences dependences;                  /* where inside a stage; of the best model too where that is no explanation */
     char description[DIAGNOSIS_TEXT_BYTES];          /* of an unknown gap */
     char next_experiment[DIAGNOSIS_TEXT_BYTES];
     size_t warnings;

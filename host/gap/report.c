@@ -84,6 +84,10 @@ void gap_report_text(const struct diagnosis *diagnosis, const struct gap_data *d
         }
         fprintf(out, "\n");
     }
+    if (diagnosis->verdict != GAP_NONE && diagnosis->verdict != GAP_RECALIBRATE) { /* else it is the sensors' own */
+        (void)dependence_text(&diagnosis->dependences, false, out);
+        (void)dependence_text(&diagnosis->dependences, true, out);
+    }
     const bool named = diagnosis->verdict == GAP_EFFECT || diagnosis->verdict == GAP_EFFECTS;
     for (size_t e = 0; e < diagnosis->effects && named; e++) {
         print_effect(out, &diagnosis->effect[e]);
@@ -185,6 +189,19 @@ static json_t *gaps_json(const struct diagnosis *diagnosis) {
     return object;
 }
 
+static json_t *dependences_json(const struct dependences *dependences) {
+    json_t *list = json_array();
+    for (size_t i = 0; i < dependences->count; i++) {
+        const struct dependence *one = &dependences->list[i];
+        json_array_append_new(list, json_pack("{s:s,s:s,s:s,s:s,s:i,s:f,s:f,s:f,s:f,s:f,s:s,s:f,s:s}", "model",
+                                              one->of_best ? "best" : "recalibrated", "residual", one->residual, "channel",
+                                              one->channel, "variable", one->variable, "chamber", (int)one->chamber, "share",
+                                              one->share, "p", one->p, "q", one->q, "from", one->from, "to", one->to, "unit",
+                                              one->unit, "off", one->off, "off_unit", one->off_unit));
+    }
+    return list;
+}
+
 static json_t *report_json(const struct diagnosis *diagnosis, const struct gap_data *data) {
     json_t *chambers = json_array(), *group = json_array(), *warnings = json_array(), *logs = json_array();
     for (size_t c = 0; c < 3; c++) {
@@ -203,10 +220,10 @@ static json_t *report_json(const struct diagnosis *diagnosis, const struct gap_d
     }
     json_t *closed = interval_json(&diagnosis->closed, NULL);
     json_object_set_new(closed, "recalibration", json_real(diagnosis->closed_recalibration.value));
-    return json_pack("{s:s,s:o,s:s,s:{s:s,s:o,s:s},s:o,s:o,s:o,s:{s:o,s:o},s:o,s:o,s:s,s:s,s:o,s:o}", "verdict",
+    return json_pack("{s:s,s:o,s:s,s:{s:s,s:o,s:s},s:o,s:o,s:o,s:o,s:{s:o,s:o},s:o,s:o,s:s,s:s,s:o,s:o}", "verdict",
                      gap_verdict_name(diagnosis->verdict), "logs", logs, "module", data->module, "locus", "stage",
                      diagnosis->stage, "chambers", chambers, "regime", diagnosis->regime, "effects",
-                     effects_json(diagnosis), "group", group, "structure",
+                     effects_json(diagnosis), "group", group, "dependence", dependences_json(&diagnosis->dependences), "structure",
                      json_pack("[f,f,f]", diagnosis->structure[0], diagnosis->structure[1], diagnosis->structure[2]), "nominal", "stiffness_scale",
                      interval_json(&diagnosis->stiffness_scale, "1"), "supply_scale",
                      interval_json(&diagnosis->supply_scale, "1"), "gap", gaps_json(diagnosis), "closed_fraction",

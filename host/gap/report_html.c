@@ -310,7 +310,7 @@ static void write_provenance(FILE *out, const struct diagnosis *diagnosis, const
 
 /* --- the page --- */
 
-static bool write_series(FILE *out, const struct search *search) {
+static bool write_series(FILE *out, const struct diagnosis *diagnosis, const struct search *search) {
     struct report_series series;
     if (!report_series_open(&series, search)) {
         return false;
@@ -322,6 +322,7 @@ static bool write_series(FILE *out, const struct search *search) {
     report_runs(out, &series, search->data);
     fputs("</section>\n<section id=\"residuals\"><h2>What is left, against what it might depend on</h2>\n",
           out);
+    dependence_html(&diagnosis->dependences, out);
     const bool sound = report_residuals(out, &series, search->data);
     fputs("</section>\n", out);
     report_series_close(&series);
@@ -337,7 +338,7 @@ static bool write_page(FILE *out, const struct diagnosis *diagnosis, const struc
     report_style(out);
     fputs("</head>\n<body><main>\n", out);
     report_verdict(out, diagnosis, search);
-    const bool sound = write_series(out, search) && write_candidates(out, diagnosis, search);
+    const bool sound = write_series(out, diagnosis, search) && write_candidates(out, diagnosis, search);
     write_open(out, diagnosis, search);
     write_provenance(out, diagnosis, search);
     fputs("</main></body>\n</html>\n", out);

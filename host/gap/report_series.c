@@ -291,10 +291,10 @@ static void lend_pose(struct report_run *to) {
 
 /* --- all --- */
 
-static bool fill_model(struct report_series *series, const struct search *search, size_t model,
-                       struct pose_sum *const *pose, struct replay_state *state) {
+static bool fill_model(struct report_series *series, const struct search *search,
+                       const struct gap_model *const models[2], size_t model, struct pose_sum *const *pose,
+                       struct replay_state *state) {
     const struct replay *replay = &search->replay;
-    const struct gap_model *models[2] = {&search->nominal.model, &search->best.model};
     double *residual = calloc(replay->residuals + 1, sizeof *residual);
     if (residual == NULL) {
         return false;
@@ -330,6 +330,12 @@ static bool fill_measured(struct report_run *to, const struct replay_run *run, s
 }
 
 bool report_series_open(struct report_series *series, const struct search *search) {
+    return report_series_open_models(series, search, &search->nominal.model, &search->best.model);
+}
+
+bool report_series_open_models(struct report_series *series, const struct search *search,
+                               const struct gap_model *before, const struct gap_model *after) {
+    const struct gap_model *const models[2] = {before, after};
     const struct replay *replay = &search->replay;
     struct pose_sum *pose[GAP_RUNS_MAX] = {NULL};
     struct replay_state state;
@@ -340,7 +346,7 @@ bool report_series_open(struct report_series *series, const struct search *searc
         sound = fill_measured(&series->run[i], &replay->run[i], &pose[i]);
     }
     for (size_t model = 0; model < 2 && sound; model++) {
-        sound = fill_model(series, search, model, pose, &state);
+        sound = fill_model(series, search, models, model, pose, &state);
     }
     for (size_t i = 0; i < series->runs && sound; i++) {
         mark_held_out(replay, &replay->run[i], &series->run[i]);

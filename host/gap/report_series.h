@@ -1,6 +1,6 @@
 /* What the pictures of the HTML report are drawn from: a table for each run, a row for each block over which
- * residuals are averaged, with what was measured and what the model says before (nominal) and after (the best
- * model). Pressures in kPa, positions in mm, angles in degrees; NAN: nothing was measured. */
+ * residuals are averaged, with what was measured and what two models say, one before and one after (nominal and
+ * best, unless others are asked for). Pressures in kPa, positions in mm, angles in degrees; NAN: nothing was measured. */
 #ifndef TRIBEND_GAP_REPORT_SERIES_H
 #define TRIBEND_GAP_REPORT_SERIES_H
 
@@ -61,6 +61,9 @@ struct report_series {
 
 /* False: out of memory; nothing is left open. */
 bool report_series_open(struct report_series *series, const struct search *search);
+/* The same of two other models. */
+bool report_series_open_models(struct report_series *series, const struct search *search,
+                               const struct gap_model *before, const struct gap_model *after);
 void report_series_close(struct report_series *series);
 bool report_table_has(const struct report_table *table, size_t column);
 /* Root mean square of a column; NAN: it is empty. */

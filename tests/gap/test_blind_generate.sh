@@ -59,9 +59,58 @@ bad_tables_are_refused() {
     "$generate" --table "$scratch/short.tbt" --out "$scratch/none"
     [ $? -eq 3 ] && [ ! -e "$scratch/none" ] && { "$generate" --table "$table" --module other --out "$scratch/none"; [ $? -eq 3 ]; }
 }
+part_of_a_corpus_is_the_same_cases() {
+    "$generate" --seed 4 --corpus single --first 1 --count 2 --seconds 6 --table "$table" --module paper-semicircle --out "$scratch/part" &&
+        [ "$(find "$scratch/part/truth" -name '*.json' | wc -l)" -eq 2 ] || return 1
+    local truth id
+    for truth in "$scratch"/part/truth/*.json; do
+        id=$(basename "$truth" .json)
+        cmp "$truth" "$scratch/one/truth/$id.json" && cmp "$scratch/part/logs/$id-2.csv" "$scratch/one/logs/$id-2.csv" || return 1
+    done
+}
+cat >"$scratch/plan.yaml" <<'PLAN'
+module: paper-semicircle
+steps:
+  - { for: 1s, pressure: [20mbar, 0mbar, 0mbar] }
+  - { for: 2s, ramp_to: [20mbar, 40mbar, 0mbar] }
+  - { for: 1s, sine: { chambers: [3], amplitude: 1kPa, mean: 2kPa, period: 1s } }
+  - { for: 1s, bend: 30deg, toward: 90deg }
+PLAN
+follow() { # folder truth plan
+    "$generate" --truth "$2" --plan "$3" --table "$table" --module paper-semicircle --out "$scratch/$1"
+}
+# Commands at times: the plan's, after a second of rest. The random run lasts as long and does something else.
+a_plan_is_followed() {
+    local truth id
+    truth=$(find "$scratch/all/truth" -name '*.json' -exec grep -l '"corpus": "nogap"' {} + | head -n 1)
+    id=$(basename "$truth" .json)
+    follow next "$truth" "$scratch/plan.yaml" && follow again "$truth" "$scratch/plan.yaml" && diff -r "$scratch/next" "$scratch/again" || return 1
+    [ "$(tail -n 1 "$scratch/next/planned/$id.csv" | cut -d, -f1)" = 7.000000 ] &&
+        [ "$(tail -n 1 "$scratch/next/random/$id.csv" | cut -d, -f1)" = 7.000000 ] || return 1
+    ! cmp -s "$scratch/next/planned/$id.csv" "$scratch/next/random/$id.csv" && awk -F, '
+        function near(a, b) { return a - b < 60 && b - a < 60 }
+        /^[0-9]/ && $1 > 1.5 && $1 < 1.9 && !(near($5, 2000) && near($6, 0)) { print "step:", $0; bad = 1 }
+        /^[0-9]/ && $1 > 2.9 && $1 < 3.1 && !(near($5, 2000) && near($6, 2000 + 2000 * ($1 - 3))) { print "ramp:", $0; bad = 1 }
+        /^[0-9]/ && $1 > 4.2 && $1 < 4.3 && !(near($5, 0) && near($7, 3000)) { print "sine:", $0; bad = 1 }
+        /^[0-9]/ && $1 > 5.8 && $1 < 6 && $5 + $6 + $7 < 1000 { print "bend:", $0; bad = 1 }
+        END { exit bad }' "$scratch/next/planned/$id.csv"
+}
+bad_plans_name_their_line() {
+    local truth
+    truth=$(find "$scratch/all/truth" -name '*.json' | head -n 1)
+    sed 's/pressure: \[20mbar/pressure: [20furlong/' "$scratch/plan.yaml" >"$scratch/bad.yaml"
+    follow bad "$truth" "$scratch/bad.yaml" 2>"$scratch/why"
+    [ $? -eq 3 ] && grep -q 'bad.yaml:3: a number with its unit' "$scratch/why" && [ ! -e "$scratch/bad/planned" ] || return 1
+    sed '/"draw"/,/}/d' "$truth" | sed 's/^  },$/  }/' >"$scratch/undrawn.json"
+    follow bad "$scratch/undrawn.json" "$scratch/plan.yaml" 2>"$scratch/why"
+    [ $? -eq 3 ] && grep -q 'undrawn.json' "$scratch/why"
+}
 check same_seed_same_bytes same_seed_same_bytes
+check part_of_a_corpus_is_the_same_cases part_of_a_corpus_is_the_same_cases
 check another_seed_other_cases another_seed_other_cases
 check every_corpus_can_be_drawn every_corpus_can_be_drawn
+check a_plan_is_followed a_plan_is_followed
+check bad_plans_name_their_line bad_plans_name_their_line
 check names_say_nothing names_say_nothing
 check metadata_say_nothing metadata_say_nothing
 check a_row_inside_every_period a_row_inside_every_period

@@ -189,8 +189,9 @@ static void same_seed_draws_the_same_case(void **state) {
     struct blind_field field;
     (void)state;
     assert_true(blind_field_open(&field, &file.table));
-    assert_true(blind_case_open(&one, &field, 11, "single", 3, 6.0));
-    assert_true(blind_case_open(&two, &field, 11, "single", 3, 6.0));
+    const struct blind_draw draw = {11, "single", 3, 6.0};
+    assert_true(blind_case_open(&one, &field, &draw));
+    assert_true(blind_case_open(&two, &field, &draw));
     assert_string_equal(one.id, two.id);
     assert_true(one.effects == 1 && two.effects == 1);
     assert_memory_equal(one.effect[0].parameter, two.effect[0].parameter, sizeof one.effect[0].parameter);

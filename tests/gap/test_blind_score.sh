@@ -42,7 +42,23 @@ truth d2 ablation unknown 10 "$creep" '"creep"'
 answer d2 effect "tip sensor" "" '{"name": "tip_offset", "stage": "tip sensor", "probability": 0.95}' ""
 truth e1 confounded group 10 "$leak"
 answer e1 group valve 2 "" '"chamber_leak", "line_resistance"'
-"$score" --truth "$scratch/truth" --answers "$scratch/answers" --csv "$scratch/confusion.csv" >"$scratch/table"
+# A second group, of three; the plan leaves the right effect, and two of three; the random experiment a wrong name, and two.
+truth e2 confounded group 10 "$creep"
+answer e2 group body "" "$said_creep" '"creep", "hysteresis", "mullins", "creep"'
+mkdir "$scratch/planned" "$scratch/random"
+mv "$scratch/answers" "$scratch/before"
+answer_to() { # folder, then as answer
+    mkdir "$scratch/answers"
+    answer "${@:2}"
+    mv "$scratch/answers/$2.json" "$scratch/$1" && rmdir "$scratch/answers"
+}
+answer_to planned e1 effect valve 2 "$said_leak" ""
+answer_to planned e2 group body "" "$said_creep" '"creep", "hysteresis"'
+answer_to random e1 effect valve 2 '{"name": "line_resistance", "stage": "valve", "probability": 0.9}' ""
+answer_to random e2 group body "" "$said_creep" '"creep", "mullins"'
+mv "$scratch/before" "$scratch/answers"
+"$score" --truth "$scratch/truth" --answers "$scratch/answers" --planned "$scratch/planned" --random "$scratch/random" \
+    --csv "$scratch/confusion.csv" >"$scratch/table"
 code=$?
 
 # says NAME PATTERN: a line of the table, with runs of blanks as one
@@ -67,10 +83,13 @@ says one_of_a_pair 'pairs: at least one and none false .* 2 of 2 '
 says unknown_detected 'unknown detected .* 1 of 1 '
 says a_name_on_clean_data 'named effect on no-gap data .* 1 of 1 .* missed'
 says a_near_family_will_do 'true entry removed.* 1 of 2 '
-says groups 'a group with the truth in it .* 1 of 1 '
+says groups 'a group with the truth in it .* 2 of 2 '
+says plans_that_halve 'gap plan: its experiment halves the group .* 1 of 2 .* 9\.5 to 90\.5 % . missed'
+says random_ones_that_halve 'a random one of equal length does .* 0 of 2 '
+says which_leaves_less 'after the plan in 1, after the random one in 0; groups without the truth: 0$'
 says error_of_parameters 'parameter error, median .* 10 %'
 says coverage 'interval covers the truth .* 3 of 6 '
-says abstaining_on_faint_data_is_no_failure '^6 of 12 cases$'
+says abstaining_on_faint_data_is_no_failure '^6 of 13 cases$'
 says missing_answers_are_told '^1 cases have no answer$'
 echo "[ RUN      ] confusion_matrix_is_written"
 if [ "$code" -eq 0 ] && head -n 1 "$scratch/confusion.csv" | grep -q '^truth,creep'; then

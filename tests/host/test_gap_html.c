@@ -339,6 +339,7 @@ static void the_page_is_whole_and_says_what_was_found(void **state) {
     }
     assert_has(report->page, table.table.module.name);
     assert_has(report->page, "left out on request");
+    assert_has(report->page, "pairs of a residual and a variable"); /* on what the residuals depend */
 }
 
 static void the_page_loads_nothing(void **state) {

@@ -20,9 +20,10 @@ BENCH_C    := $(wildcard tests/bench/bench_*.c)
 SUPPORT_C  := $(filter-out $(TEST_C) $(BENCH_C),$(wildcard tests/*/*.c))
 SOLID_C    := $(wildcard tests/model/ccx/*.c)
 BLIND_SCORE_C := $(wildcard tests/gap/blind/blind_score*.c)
+SHARE_C := $(wildcard tests/gap/share/*.c)
 BLIND_MAIN := tests/gap/blind/blind_generate.c
 BLIND_C    := $(filter-out $(BLIND_SCORE_C) $(BLIND_MAIN),$(wildcard tests/gap/blind/blind_*.c))
-ALL_C      := $(wildcard docs/examples/*.c) $(FIRMWARE_C) $(SIM_C) $(MODEL_C) $(TABLES_CLI_C) $(HOST_C) $(HOST_MAIN) $(TEST_C) $(BENCH_C) $(SUPPORT_C) $(SOLID_C) $(BLIND_C) $(BLIND_MAIN) $(BLIND_SCORE_C)
+ALL_C      := $(wildcard docs/examples/*.c) $(FIRMWARE_C) $(SIM_C) $(MODEL_C) $(TABLES_CLI_C) $(HOST_C) $(HOST_MAIN) $(TEST_C) $(BENCH_C) $(SUPPORT_C) $(SOLID_C) $(BLIND_C) $(BLIND_MAIN) $(BLIND_SCORE_C) $(SHARE_C)
 ALL_H      := $(wildcard tests/gap/blind/*.h tests/model/ccx/*.h firmware/*.h firmware/*/*.h hal/*.h hal/*/*.h model/*/*.h host/*/*.h tests/*/*.h)
 
 # --- flags
@@ -50,7 +51,7 @@ SUPPORT_O  := $(call object,$(SUPPORT_C))
 
 PROGRAMS := $(BUILD)/tribend-tables $(BUILD)/tribend
 TEST_PROGRAMS  := $(patsubst %.c,$(BUILD)/%,$(TEST_C))
-BLIND_PROGRAMS := $(BUILD)/tests/gap/blind/blind_generate $(BUILD)/tests/gap/blind/blind_score
+BLIND_PROGRAMS := $(BUILD)/tests/gap/blind/blind_generate $(BUILD)/tests/gap/blind/blind_score $(BUILD)/tests/gap/share/gap_share
 BENCH_PROGRAMS := $(patsubst %.c,$(BUILD)/%,$(BENCH_C))
 
 HOST_LIBS  := -ljansson -lcyaml -lyaml -fopenmp -lm
@@ -68,6 +69,9 @@ $(BUILD)/model/%.o: model/%.c
 $(BUILD)/host/gap/%.o: host/gap/%.c
 	@mkdir -p $(@D)
 	$(say)$(CC) $(OPTIMISE) $(SANITIZE_FLAGS) $(COMMON_FLAGS) -fopenmp -MMD -MP -c $< -o $@
+$(BUILD)/tests/gap/share/%.o: tests/gap/share/%.c
+	@mkdir -p $(@D)
+	$(say)$(CC) $(OPTIMISE) $(SANITIZE_FLAGS) $(MODEL_FLAGS) -MMD -MP -c $< -o $@
 $(BUILD)/%.o: %.c
 	@mkdir -p $(@D)
 	$(say)$(CC) $(OPTIMISE) $(SANITIZE_FLAGS) $(COMMON_FLAGS) -MMD -MP -c $< -o $@
@@ -91,9 +95,12 @@ $(BUILD)/tests/bench/bench_model $(BUILD)/tests/bench/bench_solid: %: %.o $(MODE
 	$(link) $(MODEL_LIBS)
 # The blind generator has nothing of the simulator in it, the scorer nothing of anything.
 $(BUILD)/tests/gap/blind/blind_generate: $(call object,$(BLIND_MAIN) $(BLIND_C)) $(FIRMWARE_O)
-	$(link) -ljansson -lm
+	$(link) -ljansson -lyaml -lm
 $(BUILD)/tests/gap/blind/blind_score: $(call object,$(BLIND_SCORE_C))
 	$(link) -ljansson -lm
+# Steps over cores and ranks: the tables' own sweep, which needs MPI.
+$(BUILD)/tests/gap/share/gap_share: $(call object,$(SHARE_C) $(wildcard model/sweep/*.c))
+	$(link) $(shell pkg-config --libs mpi-c 2>/dev/null) -lz -fopenmp
 $(BUILD)/tests/gap/test_blind_plant: $(call object,$(filter-out %/blind_truth.c,$(BLIND_C)))
 $(BUILD)/tests/%: $(BUILD)/tests/%.o $(SUPPORT_O) $(HOST_O) $(SIM_O) $(FIRMWARE_O) $(SHARED_O)
 	$(link) -lcmocka $(HOST_LIBS)

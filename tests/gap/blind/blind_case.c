@@ -240,9 +240,13 @@ static void close_records(struct blind_case *blind) {
     }
 }
 
-/* One run; `*fits`: the module stayed within its range and no fault was latched. */
+bool blind_record_fits(const struct blind_record *record, const struct bend_table *table) {
+    return !record->faulted && record->bend_most_rad < BEND_MOST_RAD &&
+           record->load_most_pa < (double)table->axis_pa[0][table->nodes[0] - 1];
+}
+
+/* One run; `*fits`: as blind_record_fits(). */
 static bool run_once(struct blind_case *blind, struct blind_field *field, size_t r, double pressure_most_pa, bool *fits) {
-    const struct bend_table *table = field->table;
     struct blind_effect *pointer[BLIND_EFFECTS_MAX];
     struct blind_excitation excitation;
     struct blind_random random;
@@ -256,8 +260,7 @@ static bool run_once(struct blind_case *blind, struct blind_field *field, size_t
     blind_record_close(&blind->record[r]);
     const bool ran = blind_run(&blind->rig[r], field, pointer, count, &excitation, NULL, &blind->record[r]);
     blind_excitation_close(&excitation);
-    *fits = !blind->record[r].faulted && blind->record[r].bend_most_rad < BEND_MOST_RAD &&
-            blind->record[r].load_most_pa < (double)table->axis_pa[0][table->nodes[0] - 1];
+    *fits = blind_record_fits(&blind->record[r], field->table);
     return ran;
 }
 
@@ -395,19 +398,19 @@ static bool try_case(struct blind_case *blind, struct blind_field *field, uint64
     return true;
 }
 
-bool blind_case_open(struct blind_case *blind, struct blind_field *field, uint64_t seed, const char *corpus_name,
-                     size_t index, double seconds) {
+bool blind_case_open(struct blind_case *blind, struct blind_field *field, const struct blind_draw *draw) {
     struct blind_random random;
     memset(blind, 0, sizeof *blind);
-    blind_random_open(&random, seed, "mixed", index);
+    blind->draw = *draw;
+    blind_random_open(&random, draw->seed, "mixed", draw->index);
     const struct corpus *corpus =
-        strcmp(corpus_name, "mixed") == 0 ? &corpora[blind_below(&random, CORPORA)] : corpus_of(corpus_name);
+        strcmp(draw->corpus, "mixed") == 0 ? &corpora[blind_below(&random, CORPORA)] : corpus_of(draw->corpus);
     blind->corpus = corpus->name;
     blind->verdict = corpus->verdict;
-    name_case(blind, seed, index);
+    name_case(blind, draw->seed, draw->index);
     bool fits = false;
     for (size_t attempt = 0; attempt < ATTEMPTS && !fits; attempt++) {
-        if (!try_case(blind, field, seed, corpus, index, attempt, seconds, &fits)) {
+        if (!try_case(blind, field, draw->seed, corpus, draw->index, attempt, draw->seconds, &fits)) {
             return false;
         }
     }

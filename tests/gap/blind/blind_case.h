@@ -9,8 +9,17 @@
 #define BLIND_ID_BYTES 12
 #define BLIND_GROUP_MAX 4
 
+/* From what a case was drawn: the same again gives the same case. */
+struct blind_draw {
+    uint64_t seed;
+    const char *corpus; /* as asked for: "mixed" stays that */
+    size_t index;
+    double seconds;
+};
+
 struct blind_case {
     char id[BLIND_ID_BYTES];
+    struct blind_draw draw;
     const char *corpus;
     const char *verdict; /* the answer to give */
     struct blind_effect effect[BLIND_EFFECTS_MAX];
@@ -29,9 +38,10 @@ struct blind_case {
 
 /* The name of a corpus that can be drawn, or NULL. */
 const char *blind_corpus_find(const char *name);
-/* Draws case `index` of a corpus and runs it. False: `blind_case_close` all the same; out of memory, or no draw fitted. */
-bool blind_case_open(struct blind_case *blind, struct blind_field *field, uint64_t seed, const char *corpus, size_t index,
-                     double seconds);
+/* Draws a case and runs it. False: `blind_case_close` all the same; out of memory, or no draw fitted. */
+bool blind_case_open(struct blind_case *blind, struct blind_field *field, const struct blind_draw *draw);
+/* The module stayed within its range and no fault was latched. */
+bool blind_record_fits(const struct blind_record *record, const struct bend_table *table);
 void blind_case_close(struct blind_case *blind);
 
 #endif

@@ -103,6 +103,7 @@ static void limit(struct blind_excitation *excitation, struct blind_field *field
 
 bool blind_excitation_open(struct blind_excitation *excitation, enum blind_excitation_kind kind, struct blind_random *random,
                            struct blind_field *field, double stiffness_scale, double pressure_most_pa, double seconds) {
+    excitation->bend = NULL;
     excitation->count = (size_t)ceil(seconds / TARGET_S) + 1;
     excitation->target_pa = calloc(excitation->count, sizeof *excitation->target_pa);
     if (excitation->target_pa == NULL) {
@@ -119,7 +120,9 @@ bool blind_excitation_open(struct blind_excitation *excitation, enum blind_excit
 
 void blind_excitation_close(struct blind_excitation *excitation) {
     free(excitation->target_pa);
+    free(excitation->bend);
     excitation->target_pa = NULL;
+    excitation->bend = NULL;
 }
 
 double blind_holding_duty(double pressure_pa) {

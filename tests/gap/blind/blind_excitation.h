@@ -14,9 +14,18 @@ enum blind_excitation_kind {
     BLIND_EXCITE_STRAIGHT /* all chambers hold the same pressure: the module never bends */
 };
 
+/* A bend that is commanded in place of pressures. */
+struct blind_bend {
+    bool wanted;
+    double bend_rad;
+    double direction_rad;
+    double co_contraction_pa;
+};
+
 struct blind_excitation {
     size_t count;
     double (*target_pa)[3];
+    struct blind_bend *bend; /* [count]; NULL: pressures throughout */
 };
 
 /* The pressure of one chamber that bends the module of stiffness one by a right angle, or the end of its range. */

@@ -1,4 +1,5 @@
-/* blind_generate: writes a corpus of blind cases, two run logs each, and the sealed truth beside them. */
+/* blind_generate: writes a corpus of blind cases, two run logs each, and the sealed truth beside them; or, for the truth of a
+ * case and a plan, what the same plant shows when the plan is followed. */
 #include <argp.h>
 #include <errno.h>
 #include <stdio.h>
@@ -6,14 +7,20 @@
 #include <string.h>
 #include <sys/stat.h>
 
+#include "blind_next.h"
+#include "blind_plan.h"
 #include "blind_truth.h"
 
 #define PATH_BYTES 4096
+#define ERROR_BYTES 4352
 
 struct arguments {
     uint64_t seed;
     const char *corpus;
+    size_t first;
     size_t count;
+    const char *truth;
+    const char *plan;
     const char *table;
     const char *module;
     const char *out;
@@ -25,6 +32,9 @@ static const struct argp_option options[] = {
     {"corpus", 'c', "NAME", 0,
      "single, local, pair, unknown, ablation, nogap, recalibrate, geometry, confounded or mixed (default single)", 0},
     {"count", 'n', "K", 0, "cases (default 1)", 0},
+    {"first", 'f', "I", 0, "number of the first case (default 0)", 0},
+    {"truth", 'T', "FILE", 0, "the case of this truth once more, with --plan", 1},
+    {"plan", 'p', "PLAN.yaml", 0, "follow it: writes OUT/planned/ID.csv, and OUT/random/ID.csv of the same length", 1},
     {"table", 't', "FILE", 0, "bend table of the module", 0},
     {"module", 'm', "NAME", 0, "the module that the table must be of", 0},
     {"seconds", 'd', "SECONDS", 0, "length of each run (default 30)", 0},
@@ -55,6 +65,15 @@ static error_t parse(int key, char *argument, struct argp_state *state) {
     case 'n':
         arguments->count = (size_t)read_number(state, argument, 0.0, 1e6);
         return 0;
+    case 'f':
+        arguments->first = (size_t)read_number(state, argument, 0.0, 1e6);
+        return 0;
+    case 'T':
+        arguments->truth = argument;
+        return 0;
+    case 'p':
+        arguments->plan = argument;
+        return 0;
     case 't':
         arguments->table = argument;
         return 0;
@@ -70,6 +89,9 @@ static error_t parse(int key, char *argument, struct argp_state *state) {
     case ARGP_KEY_END:
         if (arguments->table == NULL || arguments->out == NULL) {
             argp_error(state, "--table and --out are wanted");
+        }
+        if ((arguments->truth == NULL) != (arguments->plan == NULL)) {
+            argp_error(state, "--truth and --plan go together");
         }
         return 0;
     default:
@@ -115,8 +137,9 @@ static int generate(const struct arguments *arguments, const struct bend_table *
     static struct blind_case blind;
     struct blind_field field;
     int failed = blind_field_open(&field, table) ? 0 : 1;
-    for (size_t i = 0; i < arguments->count && failed == 0; i++) {
-        if (!blind_case_open(&blind, &field, arguments->seed, arguments->corpus, i, arguments->seconds)) {
+    for (size_t i = arguments->first; i < arguments->first + arguments->count && failed == 0; i++) {
+        const struct blind_draw draw = {arguments->seed, arguments->corpus, i, arguments->seconds};
+        if (!blind_case_open(&blind, &field, &draw)) {
             (void)fprintf(stderr, "blind_generate: case %zu of %s: no draw fitted the module, or out of memory\n", i,
                           arguments->corpus);
             failed = 4;
@@ -127,6 +150,60 @@ static int generate(const struct arguments *arguments, const struct bend_table *
         blind_case_close(&blind);
     }
     blind_field_close(&field);
+    return failed;
+}
+
+/* --- once more --- */
+
+static bool write_next(const struct blind_case *blind, const struct bend_table *table, const struct blind_record *record,
+                       const char *folder, const char *out) {
+    char path[PATH_BYTES];
+    struct blind_random random;
+    blind_random_open(&random, blind->rig[0].seed, folder, 1);
+    (void)snprintf(path, sizeof path, "%s/%s/%s.csv", out, folder, blind->id);
+    return make_folder(out, folder) && blind_log_write(path, &table->module, record, &blind->form, &random);
+}
+
+static int run_next(const struct arguments *arguments, const struct bend_table *table, struct blind_case *blind,
+                    struct blind_field *field, const struct blind_excitation *plan, double seconds) {
+    struct blind_record planned = {0}, random = {0};
+    int failed = 0;
+    if (!blind_next_planned(blind, field, plan, seconds, &planned) || !blind_next_random(blind, field, seconds, &random)) {
+        (void)fprintf(stderr, "blind_generate: %s: the plant failed under %s, or out of memory\n", arguments->truth, arguments->plan);
+        failed = 4;
+    } else if (!write_next(blind, table, &planned, "planned", arguments->out) ||
+               !write_next(blind, table, &random, "random", arguments->out)) {
+        (void)fprintf(stderr, "blind_generate: %s: %s\n", arguments->out, strerror(errno));
+        failed = 5;
+    }
+    blind_record_close(&planned);
+    blind_record_close(&random);
+    return failed;
+}
+
+/* The case is drawn again from what its truth says it was drawn from: the same seed gives the same plant. */
+static int generate_next(const struct arguments *arguments, const struct bend_table *table) {
+    static struct blind_case blind;
+    struct blind_field field;
+    struct blind_draw draw;
+    struct blind_excitation plan;
+    double seconds = 0.0;
+    char id[BLIND_ID_BYTES], error[ERROR_BYTES];
+    if (!blind_truth_read(arguments->truth, &draw, id, error, sizeof error) ||
+        !blind_plan_open(arguments->plan, &plan, &seconds, error, sizeof error)) {
+        (void)fprintf(stderr, "blind_generate: %s\n", error);
+        return 3;
+    }
+    int failed = blind_field_open(&field, table) ? 0 : 4;
+    if (failed == 0 && (!blind_case_open(&blind, &field, &draw) || strcmp(blind.id, id) != 0)) {
+        (void)fprintf(stderr, "blind_generate: %s: its case cannot be drawn again: was it made with another table?\n", arguments->truth);
+        failed = 4;
+    } else if (failed == 0) {
+        failed = run_next(arguments, table, &blind, &field, &plan, seconds);
+    }
+    blind_case_close(&blind);
+    blind_field_close(&field);
+    blind_excitation_close(&plan);
     return failed;
 }
 
@@ -143,12 +220,14 @@ int main(int argc, char **argv) {
         free(bytes);
         return 3;
     }
-    if (!make_folder(arguments.out, "") || !make_folder(arguments.out, "logs") || !make_folder(arguments.out, "truth")) {
+    const bool next = arguments.truth != NULL;
+    if (!make_folder(arguments.out, "") ||
+        (!next && (!make_folder(arguments.out, "logs") || !make_folder(arguments.out, "truth")))) {
         (void)fprintf(stderr, "blind_generate: %s: %s\n", arguments.out, strerror(errno));
         free(bytes);
         return 5;
     }
-    const int code = generate(&arguments, &table);
+    const int code = next ? generate_next(&arguments, &table) : generate(&arguments, &table);
     free(bytes);
     return code;
 }

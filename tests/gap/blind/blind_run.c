@@ -124,10 +124,16 @@ static bool seam_write_outputs(void *context, const struct hal_outputs *outputs)
 
 /* --- who drives --- */
 
-static void shifted_target(const struct bench *bench, const struct blind_excitation *excitation, double target_pa[3]) {
+/* Which of the excitation's values holds. */
+static size_t wish_at(const struct bench *bench, const struct blind_excitation *excitation) {
     const size_t at = (size_t)(bench->plant.time_us / BLIND_TARGET_US);
+    return at < excitation->count ? at : excitation->count - 1;
+}
+
+static void shifted_target(const struct bench *bench, const struct blind_excitation *excitation, double target_pa[3]) {
+    const size_t at = wish_at(bench, excitation);
     for (size_t c = 0; c < 3; c++) {
-        const double wanted = excitation->target_pa[at < excitation->count ? at : excitation->count - 1][c];
+        const double wanted = excitation->target_pa[at][c];
         target_pa[c] = wanted > 0.0 ? fmax(wanted + bench->rig->target_shift_pa[c], 0.0) : 0.0;
     }
 }
@@ -136,10 +142,17 @@ static void step_controller(struct bench *bench, struct app *app, const struct b
     const bool begun = bench->plant.time_us >= (int64_t)(1e6 * BLIND_REST_S);
     if (begun && bench->plant.time_us % BLIND_TARGET_US == 0) {
         struct controller_command command = {.kind = COMMAND_PRESSURE};
+        const struct blind_bend *bend = excitation->bend != NULL ? &excitation->bend[wish_at(bench, excitation)] : NULL;
         double target_pa[3];
         shifted_target(bench, excitation, target_pa);
         for (size_t c = 0; c < 3; c++) {
             command.pressure_pa[c] = (float)target_pa[c];
+        }
+        if (bend != NULL && bend->wanted) {
+            command = (struct controller_command){.kind = COMMAND_BEND,
+                                                  .bend_rad = (float)bend->bend_rad,
+                                                  .direction_rad = (float)bend->direction_rad,
+                                                  .co_contraction_pa = (float)bend->co_contraction_pa};
         }
         app_command(app, &command);
     }

@@ -6,6 +6,7 @@
 #include <string.h>
 
 #include "blind_score_measure.h"
+#include "blind_score_plan.h"
 
 #define WORDS_MAX 128
 #define BINS 5
@@ -13,6 +14,8 @@
 struct arguments {
     const char *truth;
     const char *answers;
+    const char *planned;
+    const char *random;
     const char *csv;
     bool strict;
 };
@@ -20,6 +23,8 @@ struct arguments {
 static const struct argp_option options[] = {
     {"truth", 't', "DIR", 0, "the sealed truth, ID.json", 0},
     {"answers", 'a', "DIR", 0, "the reports of the diagnosis, ID.json", 0},
+    {"planned", 'p', "DIR", 0, "the reports with the log of the planned experiment added, for answers that are a group", 0},
+    {"random", 'r', "DIR", 0, "the same with the log of a random experiment", 0},
     {"csv", 'c', "FILE", 0, "write the confusion matrix there", 0},
     {"strict", 's', NULL, 0, "exit with 1 where a measure is surely missed (its whole interval)", 0},
     {0}};
@@ -33,6 +38,12 @@ static error_t parse(int key, char *argument, struct argp_state *state) {
     case 'a':
         arguments->answers = argument;
         return 0;
+    case 'p':
+        arguments->planned = argument;
+        return 0;
+    case 'r':
+        arguments->random = argument;
+        return 0;
     case 'c':
         arguments->csv = argument;
         return 0;
@@ -42,6 +53,9 @@ static error_t parse(int key, char *argument, struct argp_state *state) {
     case ARGP_KEY_END:
         if (arguments->truth == NULL || arguments->answers == NULL) {
             argp_error(state, "--truth and --answers are wanted");
+        }
+        if ((arguments->planned == NULL) != (arguments->random == NULL)) {
+            argp_error(state, "--planned and --random go together");
         }
         return 0;
     default:
@@ -121,6 +135,42 @@ static bool print_measures(const struct score_case *cases, size_t count) {
     print_parameters(cases, count);
     print_number("calibration of the probabilities (ECE, 5 bins)", "<= 0.08", calibration, " ", used);
     print_closed(cases, count);
+    return missed;
+}
+
+/* --- the next experiment --- */
+
+#define HALVED_LEAST 0.70
+
+static void print_halved(const char *name, const char *target, size_t halved, size_t groups) {
+    double low, high;
+    score_wilson(halved, groups, &low, &high);
+    printf("%-52s | %10s | %6.1f %% | %4zu of %4zu | %5.1f to %5.1f %% | ", name, target, 100.0 * (double)halved / (double)groups,
+           halved, groups, 100.0 * low, 100.0 * high);
+}
+
+/* Returns whether the whole interval misses the target. */
+static bool print_plans(const struct arguments *arguments, const struct score_case *cases, size_t count) {
+    struct score_case *planned = NULL, *random = NULL;
+    size_t planned_count = 0, random_count = 0;
+    bool missed = false;
+    if (arguments->planned != NULL && score_cases_read(arguments->truth, arguments->planned, &planned, &planned_count) &&
+        score_cases_read(arguments->truth, arguments->random, &random, &random_count) && planned_count == count &&
+        random_count == count) {
+        const struct score_plan plan = score_plans(cases, planned, random, count);
+        double low, high;
+        if (plan.groups > 0) {
+            print_halved("gap plan: its experiment halves the group", ">=  70.0 %", plan.planned_halved, plan.groups);
+            printf("%s\n", (double)plan.planned_halved >= HALVED_LEAST * (double)plan.groups ? "met" : "missed");
+            print_halved("  a random one of equal length does", "", plan.random_halved, plan.groups);
+            printf("\n  fewer names are left after the plan in %zu, after the random one in %zu; groups without the truth: %zu\n",
+                   plan.planned_better, plan.random_better, plan.outside);
+            score_wilson(plan.planned_halved, plan.groups, &low, &high);
+            missed = high < HALVED_LEAST;
+        }
+    }
+    free(planned);
+    free(random);
     return missed;
 }
 
@@ -266,7 +316,8 @@ int main(int argc, char **argv) {
         free(cases);
         return 3;
     }
-    const bool missed = print_measures(cases, count);
+    bool missed = print_measures(cases, count);
+    missed = print_plans(&arguments, cases, count) || missed;
     fill_confusion(&confusion, cases, count);
     print_confusion(&confusion);
     print_failures(cases, count);

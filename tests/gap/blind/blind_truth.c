@@ -2,6 +2,7 @@
 
 #include <jansson.h>
 #include <stdio.h>
+#include <string.h>
 
 static json_t *truth_parameters(const struct blind_effect *effect) {
     json_t *parameters = json_object();
@@ -47,14 +48,39 @@ static json_t *truth_group(const struct blind_case *blind) {
 bool blind_truth_write(const char *path, const struct blind_case *blind) {
     const struct blind_nominal *nominal = &blind->rig[0].nominal;
     json_t *truth = json_pack(
-        "{s:s, s:s, s:o, s:s, s:o, s:{s:f, s:f}, s:f, s:s?, s:o, s:{s:b, s:b, s:b}}", "id", blind->id, "corpus",
+        "{s:s, s:s, s:o, s:s, s:o, s:{s:f, s:f}, s:f, s:s?, s:o, s:{s:b, s:b, s:b}, s:{s:I, s:s, s:I, s:f}}", "id", blind->id, "corpus",
         blind->corpus, "files", truth_files(blind), "verdict", blind->verdict, "effects", truth_effects(blind), "nominal",
         "stiffness_scale", nominal->stiffness_scale, "supply_scale", nominal->supply_scale, "gap_ratio", blind->gap_ratio,
         "removed", blind->removed, "group", truth_group(blind), "rig", "controlled",
         blind->rig[0].drive == BLIND_DRIVE_CONTROLLER, "supply_logged", blind->form.supply, "temperature_logged",
-        blind->form.temperature);
+        blind->form.temperature, "draw", "seed", (json_int_t)blind->draw.seed, "corpus", blind->draw.corpus, "index",
+        (json_int_t)blind->draw.index, "seconds", blind->draw.seconds);
     const bool written =
         truth != NULL && json_dump_file(truth, path, JSON_INDENT(2) | JSON_REAL_PRECISION(9) | JSON_PRESERVE_ORDER) == 0;
     json_decref(truth);
     return written;
+}
+
+bool blind_truth_read(const char *path, struct blind_draw *draw, char id[BLIND_ID_BYTES], char *error, size_t error_bytes) {
+    json_error_t why;
+    json_int_t seed = 0, index = 0;
+    const char *name = NULL, *corpus = NULL;
+    json_t *truth = json_load_file(path, 0, &why);
+    if (truth == NULL) {
+        (void)snprintf(error, error_bytes, "%s:%d: %s", path, why.line, why.text);
+        return false;
+    }
+    const bool known = json_unpack_ex(truth, &why, 0, "{s:s, s:{s:I, s:s, s:I, s:F}}", "id", &name, "draw", "seed", &seed, "corpus",
+                                      &corpus, "index", &index, "seconds", &draw->seconds) == 0 &&
+                       blind_corpus_find(corpus) != NULL && seed >= 0 && index >= 0 && strlen(name) < BLIND_ID_BYTES;
+    if (known) {
+        draw->seed = (uint64_t)seed;
+        draw->index = (size_t)index;
+        draw->corpus = blind_corpus_find(corpus);
+        (void)snprintf(id, BLIND_ID_BYTES, "%s", name);
+    } else {
+        (void)snprintf(error, error_bytes, "%s: it does not say from what it was drawn (draw): generate the case anew", path);
+    }
+    json_decref(truth);
+    return known;
 }
