@@ -318,10 +318,10 @@ static void fill_column(struct fitter *fitter, struct gap_model *model, const st
     } else if (upstream && !acts_on_gas(model->effect[parameter->effect].kind) && all_have_duties(fitter->replay)) {
         copy_state(fitter->replay, &fitter->state, &fitter->trial);
         replay_readings(fitter->replay, model, &fitter->trial);
-    } else if (upstream || index < 2) {
+    } else if (upstream) {
         replay_pressures(fitter->replay, model, &fitter->trial);
     }
-    const struct replay_state *state = nominal || upstream || index < 2 ? &fitter->trial : &fitter->state;
+    const struct replay_state *state = nominal || upstream ? &fitter->trial : &fitter->state;
     take_residuals(fitter, model, state, fitter->moved);
     *parameter->value = kept;
     for (size_t k = 0; k < fitter->replay->residuals; k++) {

@@ -190,8 +190,7 @@ static void find_in_place(struct search *search, struct rivals *rivals, struct e
         rivals->count += put_in_place(&rest, &list[i], held->onset_s, &rival->fit.model);
     }
     struct fit without = {.model = rest};
-    const int threads = search->options.threads > 0 ? search->options.threads : omp_get_max_threads();
-#pragma omp parallel for schedule(dynamic, 1) num_threads(threads)
+#pragma omp parallel for schedule(dynamic, 1) num_threads(search->options.threads > 0 ? search->options.threads : omp_get_max_threads())
     for (size_t i = 0; i < rivals->count; i++) { /* the best model is fitted already: in its turn, the rest alone */
         const bool stopped = search->options.stop != NULL && *search->options.stop != 0;
         if (!stopped) {

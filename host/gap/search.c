@@ -211,12 +211,13 @@ static bool crew_open(struct crew *crew, const struct search *search, const stru
     crew->count = 0;
     const int wanted = search->options.threads > 0 ? search->options.threads : omp_get_max_threads();
     crew->fitter = calloc((size_t)wanted, sizeof *crew->fitter);
-    for (; crew->fitter != NULL && crew->count < wanted; crew->count++) {
-        if (!fitter_open(&crew->fitter[crew->count], base)) {
-            break;
-        }
+    if (crew->fitter == NULL) {
+        return false;
     }
-    return crew->fitter != NULL && crew->count == wanted;
+    while (crew->count < wanted && fitter_open(&crew->fitter[crew->count], base)) {
+        crew->count++;
+    }
+    return crew->count == wanted;
 }
 
 static bool stopped(const struct search *search) {
@@ -324,7 +325,7 @@ static size_t screen_all(struct search *search, struct crew *crew, const struct 
 /* Keeps those worth a closer fit, best first: of each kind a few, and of those that are dear to replay a few. */
 static size_t choose(struct fit **order, size_t count) {
     size_t kept = 0, dear = 0;
-    for (size_t i = 0; i < count; i++) {
+    for (size_t i = 0; i < count && order[i] != NULL; i++) {
         const struct effect_kind *kind = order[i]->model.effect[order[i]->model.count - 1].kind;
         size_t same = 0;
         for (size_t j = 0; j < kept; j++) {
