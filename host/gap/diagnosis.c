@@ -450,7 +450,46 @@ static void list_rivals(struct diagnosis *diagnosis, const struct rivals *rivals
     }
 }
 
-static void believe_effect(struct diagnosis *diagnosis, struct diagnosis_effect *effect, const struct rivals *rivals) {
+/* By how much the pressure of a chamber moves, at most in one run. */
+static double moves_of(const struct gap_data *data, size_t chamber) {
+    double moves_pa = 0.0;
+    for (size_t i = 0; i < data->runs; i++) {
+        const struct gap_run *run = &data->run[i];
+        const double *value = run->has_reading ? run->reading_pa : run->command_pa;
+        double least = INFINITY, most = -INFINITY;
+        for (size_t row = 0; row < run->rows; row++) {
+            least = fmin(least, value[3 * row + chamber]); /* a NaN changes neither */
+            most = fmax(most, value[3 * row + chamber]);
+        }
+        moves_pa = fmax(moves_pa, most - least);
+    }
+    return moves_pa;
+}
+
+static bool one_chamber_moves(const struct gap_data *data) {
+    size_t moving = 0;
+    for (size_t c = 0; c < 3; c++) {
+        moving += moves_of(data, c) > MOVES_LEAST_PA;
+    }
+    return moving == 1;
+}
+
+/* On one chamber a narrow line does just what a sluggish valve does. Where the others flow freely the valve is the likelier; where
+ * no other flows, neither is. */
+static void share_with_twin(struct diagnosis *diagnosis, struct diagnosis_effect *effect, const struct gap_data *data) {
+    const bool valve = strcmp(effect->kind->name, "valve_sluggish") == 0;
+    const bool line = strcmp(effect->kind->name, "line_resistance") == 0, alone = one_chamber_moves(data);
+    if (!valve && !(line && (alone || effect->chamber > 0))) {
+        return;
+    }
+    const double valve_share = effect->probability * (alone ? 0.5 : SLUGGISH_SHARE);
+    add_name(diagnosis, "valve_sluggish", valve_share);
+    add_name(diagnosis, "line_resistance", effect->probability - valve_share);
+    effect->probability = valve ? valve_share : effect->probability - valve_share;
+}
+
+static void believe_effect(struct diagnosis *diagnosis, struct diagnosis_effect *effect, const struct rivals *rivals,
+                           const struct gap_data *data) {
     effect->probability = 0.0;
     for (size_t i = 0; i < rivals->count; i++) {
         if (rivals->rival[i].kind == effect->kind) {
@@ -460,12 +499,7 @@ static void believe_effect(struct diagnosis *diagnosis, struct diagnosis_effect 
     if (effect->probability < SURE) {
         name_group(diagnosis, rivals);
     }
-    /* on one chamber a narrow line does just what a sluggish valve does; the valve is the likelier */
-    if (strcmp(effect->kind->name, "valve_sluggish") == 0) {
-        effect->probability *= SLUGGISH_SHARE;
-        add_name(diagnosis, "valve_sluggish", effect->probability);
-        add_name(diagnosis, "line_resistance", 1.0 - SLUGGISH_SHARE);
-    }
+    share_with_twin(diagnosis, effect, data);
     list_rivals(diagnosis, rivals);
 }
 
@@ -476,7 +510,7 @@ static void believe(struct diagnosis *diagnosis, const struct search *search) {
     for (size_t e = 0; e < diagnosis->effects; e++) {
         for (size_t r = 0; r < search->rivals_count; r++) {
             if (search->rivals[r].place == diagnosis->effect[e].place) {
-                believe_effect(diagnosis, &diagnosis->effect[e], &search->rivals[r]);
+                believe_effect(diagnosis, &diagnosis->effect[e], &search->rivals[r], search->data);
             }
         }
     }
@@ -508,24 +542,15 @@ static void locate(struct diagnosis *diagnosis) {
 
 /* Held pressures that never move tell stiffness from nothing. */
 static bool says_nothing(struct diagnosis *diagnosis, const struct search *search) {
-    double moves_pa = 0.0;
-    for (size_t i = 0; i < search->data->runs; i++) {
-        const struct gap_run *run = &search->data->run[i];
-        const double *value = run->has_reading ? run->reading_pa : run->command_pa;
-        for (size_t c = 0; c < 3; c++) {
-            double least = INFINITY, most = -INFINITY;
-            for (size_t row = 0; row < run->rows; row++) {
-                least = fmin(least, value[3 * row + c]); /* a NaN changes neither */
-                most = fmax(most, value[3 * row + c]);
-            }
-            moves_pa = fmax(moves_pa, most - least);
-        }
+    double most_pa = 0.0;
+    for (size_t c = 0; c < 3; c++) {
+        most_pa = fmax(most_pa, moves_of(search->data, c));
     }
-    if (moves_pa > MOVES_LEAST_PA) {
+    if (most_pa > MOVES_LEAST_PA) {
         return false;
     }
     diagnosis_warn(diagnosis, "the pressures never move by more than %.0f Pa: record steps, ramps and holds of all three chambers",
-                   moves_pa);
+                   most_pa);
     return true;
 }
 
@@ -545,7 +570,7 @@ static void decide(struct diagnosis *diagnosis, const struct search *search) {
         return;
     }
     const double least = diagnosis->effects > 1 ? CLOSED_LEAST_BY_MANY : CLOSED_LEAST;
-    if (best > STRUCTURE_NONE && best > (1.0 - least) * recalibrated) {
+    if (best > STRUCTURE_NONE + (1.0 - least) * recalibrated) {
         diagnosis->verdict = GAP_UNKNOWN;
         return;
     }

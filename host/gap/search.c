@@ -26,7 +26,7 @@
 #define ONSET_FINE_S 0.15     /* an onset is not sought closer than that */
 #define COMPLETING_SHARE 0.5  /* of what is left, that a further effect must explain */
 #define POLISH_SHARE 0.025    /* of the gap, in pressures or at the tip: less than that is left by any form of the right effect */
-#define FORM_LEAST 0.0005     /* of the gap: less than that no effect is sought for */
+#define FORM_LEAST 0.003      /* of the gap: less than that no effect is sought for */
 #define WHOLE_SHARE 0.9       /* of such a small rest, that an effect must explain */
 #define STRUCTURE_LEAST 0.2   /* mean square in units of a block's noise that is worth explaining */
 #define FAINT_LEFT 0.25        /* of a faint gap: more than that left means that something else was meant */
