@@ -22,11 +22,13 @@
 #define REPEATS_CERTAIN 0.04  /* share of repeated samples that no noise makes */
 #define REPEATS_LEAST 0.02    /* share of repeated samples below which none is frozen */
 #define ONSETS 12
+#define ONSET_LEAVES 0.5
 #define LATE_SHARE 0.03       /* of the gap, that an effect with an onset may leave */
 #define ONSET_FINE_S 0.15     /* an onset is not sought closer than that */
 #define COMPLETING_SHARE 0.5  /* of what is left, that a further effect must explain */
 #define POLISH_SHARE 0.025    /* of the gap, in pressures or at the tip: less than that is left by any form of the right effect */
 #define FORM_LEAST 0.003      /* of the gap: less than that no effect is sought for */
+#define MATERIAL_SHARE 0.0003 /* of the whole gap: the same for what is left in one place of a gap that lies in the other */
 #define WHOLE_SHARE 0.9       /* of such a small rest, that an effect must explain */
 #define STRUCTURE_LEAST 0.2   /* mean square in units of a block's noise that is worth explaining */
 #define FAINT_LEFT 0.25        /* of a faint gap: more than that left means that something else was meant */
@@ -381,7 +383,8 @@ static bool is_better(const struct fit *before, const struct fit *after) {
 /* Is there more left, in pressures or at the tip, than the noise and than that share of the gap? */
 static bool is_left(const struct search *search, const struct fit *fit, enum fit_group group, double share) {
     const double all = fit_structure_of(&search->recalibrated.sums, 1, group);
-    return fit_structure_of(&fit->sums, 1, group) > fmax(STRUCTURE_LEAST, share * all);
+    const double least = fmax(share * all, MATERIAL_SHARE * structure(&search->recalibrated));
+    return fit_structure_of(&fit->sums, 1, group) > fmax(STRUCTURE_LEAST, least);
 }
 
 static bool is_simple(const struct fit *fit) {
@@ -503,7 +506,9 @@ static void find_onsets(struct search *search, struct crew *crew, struct fit *fi
             for (size_t k = 1; k < ONSETS; k++) {
                 best = held_out(&trial[k]) < held_out(&trial[best]) ? k : best;
             }
-            if (!is_better(fit, &trial[best])) {
+            /* a real onset leaves little; a form that is somewhat off gains a little by any */
+            const bool first = fit->model.effect[e].onset_s == 0.0;
+            if (!is_better(fit, &trial[best]) || (first && structure(&trial[best]) > ONSET_LEAVES * structure(fit))) {
                 break;
             }
             *fit = trial[best];
