@@ -27,9 +27,9 @@
 #define ONSET_FINE_S 0.15     /* an onset is not sought closer than that */
 #define COMPLETING_SHARE 0.5  /* of what is left, that a further effect must explain */
 #define POLISH_SHARE 0.025    /* of the gap, in pressures or at the tip: less than that is left by any form of the right effect */
-#define FORM_LEAST 0.003      /* of the gap: less than that no effect is sought for */
+#define FORM_LEAST 0.0005     /* of the gap: less than that no effect is sought for */
 #define MATERIAL_SHARE 0.0003 /* of the whole gap: the same for what is left in one place of a gap that lies in the other */
-#define WHOLE_SHARE 0.9       /* of such a small rest, that an effect must explain */
+#define WHOLE_SHARE 0.95      /* of such a small rest, that an effect must explain */
 #define STRUCTURE_LEAST 0.2   /* mean square in units of a block's noise that is worth explaining */
 #define FAINT_LEFT 0.25        /* of a faint gap: more than that left means that something else was meant */
 #define FAINT 1.5             /* mean square below which a first effect, too, must explain most of what there is */
@@ -405,7 +405,8 @@ static bool completes(const struct search *search, const struct fit *before, con
         const enum fit_group group = (enum fit_group)g;
         const double left = fit_structure_of(&before->sums, 1, group), then = fit_structure_of(&after->sums, 1, group);
         any = any || (is_left(search, before, group, POLISH_SHARE) && then < (1.0 - COMPLETING_SHARE) * left) ||
-              (is_left(search, before, group, FORM_LEAST) && is_simple(after) && then < (1.0 - WHOLE_SHARE) * left);
+              (is_left(search, before, group, FORM_LEAST) && is_simple(after) && left > 3.0 * STRUCTURE_LEAST &&
+               then < fmax((1.0 - WHOLE_SHARE) * left, STRUCTURE_LEAST));
     }
     return any;
 }
