@@ -14,9 +14,13 @@
 #define RECALIBRATED_SHARE 0.05
 /* Catalogue effects must close this share of the structured gap, or the gap is of an unknown kind. */
 #define CLOSED_LEAST 0.97
-#define CLOSED_LEAST_BY_MANY 0.98 /* by several: together they can bend to much that they are not */
-/* What forms that only nearly fit do to a parameter, as a share of the effect's size: seen against effects of other forms. */
-#define FORM_SHARE 0.025
+#define CLOSED_LEAST_BY_MANY 0.98 /* by several, or by one of many forms: they can bend to much that they are not */
+#define FEW_PARTS 3
+/* What forms that only nearly fit do to a parameter, as a share of the effect's size: this much, and in proportion to what is
+ * left of the gap, as an amplitude. Seen against effects of other forms. */
+#define FORM_SHARE 0.008
+#define FORM_BY_REST 0.9
+#define FREEZES_LAST 6.0 /* repeated samples come in runs, of about so many */
 #define BY_CHANCE_SURE 0.95 /* repeats are seen as such */
 #define GROUP_LEAST 0.15 /* belief that puts a name into the group */
 #define SLUGGISH_SHARE 0.7
@@ -385,11 +389,40 @@ static double inflation(const struct search *search) {
     return fmax(mean2, 0.3) * 3.0;
 }
 
-/* `form`: what the form of the effect may be off by; index SIZE_MAX: not fitted. */
+/* `form`: what the form of the effect may be off by, one standard deviation. */
 static struct diagnosis_interval interval_of(const struct search *search, size_t index, double value, double form) {
-    const double variance = index == SIZE_MAX ? 0.0 : fmax(search->everything.covariance[index][index], 0.0);
+    const double variance = fmax(search->everything.covariance[index][index], 0.0);
     const double spread = NINETY_PERCENT * sqrt(variance * inflation(search) + form * form);
     return (struct diagnosis_interval){value, value - spread, value + spread};
+}
+
+/* How far the forms are seen to be off: what they leave of the gap, as an amplitude. */
+static double form_share(const struct diagnosis *diagnosis) {
+    const double left = fmax(diagnosis->structure[2], 0.0), all = fmax(diagnosis->structure[1], 1e-9);
+    return FORM_SHARE + FORM_BY_REST * fmin(sqrt(left / all), 1.0);
+}
+
+/* A share of repeated samples is counted, not fitted. */
+static struct diagnosis_interval interval_of_share(const struct search *search, double share) {
+    double moving = 1.0;
+    for (size_t i = 0; i < search->data->runs; i++) {
+        moving += (double)search->data->run[i].tips_moving;
+    }
+    const double spread = NINETY_PERCENT * sqrt(share * (1.0 - share) * FREEZES_LAST / moving);
+    return (struct diagnosis_interval){share, fmax(share - spread, 0.0), fmin(share + spread, 1.0)};
+}
+
+/* A parameter that moves nothing in this recording (a rate per kelvin where the temperature stands still) may be anything. */
+static struct diagnosis_interval interval_of_parameter(const struct diagnosis *diagnosis, const struct search *search,
+                                                       const struct effect *effect, size_t i, size_t index) {
+    const struct effect_parameter *parameter = &effect->kind->parameter[i];
+    const double value = effect->parameter[i];
+    const bool within = value > parameter->least && value < parameter->most;
+    if (within && !(search->everything.covariance[index][index] > 0.0)) {
+        return (struct diagnosis_interval){isnan(parameter->none) ? value : parameter->none, parameter->least, parameter->most};
+    }
+    const double size = value - (isnan(parameter->none) ? 0.0 : parameter->none);
+    return interval_of(search, index, value, form_share(diagnosis) * size);
 }
 
 static void take_effects(struct diagnosis *diagnosis, const struct search *search) {
@@ -407,10 +440,10 @@ static void take_effects(struct diagnosis *diagnosis, const struct search *searc
                                          .chamber = effect->chamber,
                                          .onset_s = effect->onset_s};
         for (size_t i = 0; i < effect->kind->parameter_count; i++) {
-            const bool fixed = effect->kind->by_chance && i == 0;
-            const double none = effect->kind->parameter[i].none;
-            const double size = effect->parameter[i] - (isnan(none) ? 0.0 : none);
-            out->parameter[i] = interval_of(search, fixed ? SIZE_MAX : index++, effect->parameter[i], FORM_SHARE * size);
+            const bool counted = effect->kind->by_chance && i == 0;
+            out->parameter[i] = counted ? interval_of_share(search, effect->parameter[i])
+                                        : interval_of_parameter(diagnosis, search, effect, i, index);
+            index += !counted;
         }
     }
 }
@@ -569,7 +602,8 @@ static void decide(struct diagnosis *diagnosis, const struct search *search) {
         }
         return;
     }
-    const double least = diagnosis->effects > 1 ? CLOSED_LEAST_BY_MANY : CLOSED_LEAST;
+    const bool bends_to_much = diagnosis->effects > 1 || search->best.model.count > FEW_PARTS;
+    const double least = bends_to_much ? CLOSED_LEAST_BY_MANY : CLOSED_LEAST;
     if (best > STRUCTURE_NONE + (1.0 - least) * recalibrated) {
         diagnosis->verdict = GAP_UNKNOWN;
         return;

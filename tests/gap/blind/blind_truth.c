@@ -4,11 +4,17 @@
 #include <stdio.h>
 #include <string.h>
 
+/* With a logged temperature the stiffness changes by the kelvin, else by the second. */
+static const char *parameter_name(const struct blind_effect *effect, size_t i) {
+    const bool by_kelvin = strcmp(effect->kind->name, "temperature_stiffness") == 0 && effect->variant == 0;
+    return by_kelvin ? "per_kelvin" : effect->kind->parameter[i];
+}
+
 static json_t *truth_parameters(const struct blind_effect *effect) {
     json_t *parameters = json_object();
     for (size_t i = 0; i < BLIND_PARAMETERS_MAX; i++) {
         if (effect->kind->parameter[i] != NULL) {
-            (void)json_object_set_new(parameters, effect->kind->parameter[i], json_real(effect->parameter[i]));
+            (void)json_object_set_new(parameters, parameter_name(effect, i), json_real(effect->parameter[i]));
         }
     }
     return parameters;
