@@ -43,6 +43,8 @@ expect radius_negative 3 'radius_m.*-0.0037' build_table "$(module negative 's/r
 expect chambers_overlap 3 'overlap' build_table "$(module overlap 's/radius_m: .*/radius_m: 0.0070/; s/0\.0073/0.0053/; s/semicircle/circle/')"
 expect chamber_leaves_module 3 'leaves|outside' build_table "$(module leaves 's/0\.0073/0.0103/')"
 expect shape_unknown 3 'shape|triangle' build_table "$(module shape 's/shape: semicircle/shape: triangle/')"
+expect number_with_words_behind 3 "trailing.yaml:[0-9]+: length_m: '0.06banana' is not a number" build_table "$(module trailing 's/^length_m: .*/length_m: 0.06banana/')"
+expect number_with_unit 3 "unitful.yaml:[0-9]+: radius_m: '3.7mm' is not a number" build_table "$(module unitful 's/radius_m: .*/radius_m: 3.7mm/')"
 expect number_malformed 3 'length_m' build_table "$(module number 's/^length_m: .*/length_m: long/')"
 expect caps_longer_than_module 3 'cap|length' build_table "$(module caps 's/proximal_m: .*/proximal_m: 0.070/')"
 expect sector_without_opening 3 'opening_deg' build_table "$(module opening 's/shape: semicircle/shape: sector/')"
@@ -66,6 +68,10 @@ sed '/^exponents/d' tables/materials/ecoflex-0030-measured-ogden.yaml >"$scratch
 expect ogden_without_exponents 3 'one exponent for each' "$tables" material "$scratch/materials/no-exponents.yaml"
 sed 's/^law: .*/law: yeoh\nexponents: [1, 2, 3]/' tables/materials/ecoflex-0030-positive.yaml >"$scratch/materials/exponents.yaml"
 expect exponents_of_no_use 3 'only ogden' "$tables" material "$scratch/materials/exponents.yaml"
+sed 's/^density_kgpm3: .*/density_kgpm3: 1070kg/' tables/materials/ecoflex-0030-positive.yaml >"$scratch/materials/heavy.yaml"
+expect material_number_with_unit 3 "heavy.yaml:[0-9]+: density_kgpm3: '1070kg' is not a number" "$tables" material "$scratch/materials/heavy.yaml"
+sed 's/^coefficients_pa: *\[/&1e4Pa, /' tables/materials/ecoflex-0030-positive.yaml >"$scratch/materials/list.yaml"
+expect material_number_in_a_list_with_unit 3 "list.yaml:[0-9]+: coefficients_pa: '1e4Pa' is not a number" "$tables" material "$scratch/materials/list.yaml"
 expect material_name_unknown 3 'unobtainium' "$tables" material unobtainium
 expect output_folder_missing 5 '/nowhere' "$tables" solve paper-semicircle --to 2deg --csv /nowhere/path.csv
 
