@@ -6,6 +6,7 @@
 #include <unistd.h>
 
 #include "cli/commands.h"
+#include "gap/baseline.h"
 #include "gap/diagnosis.h"
 #include "gap/report.h"
 #include "gap/report_html.h"
@@ -23,6 +24,7 @@ struct arguments {
     const char *without[WITHOUT_MAX];
     size_t without_count;
     int threads;
+    bool own_baseline;
     bool quiet;
 };
 
@@ -34,6 +36,8 @@ static const struct argp_option option_list[] = {
     {"calibration-out", 'c', "FILE", 0, "write what was found as a calibration (YAML)", 1},
     {"without", 'w', "NAME", 0, "do not try this effect; may be repeated", 2},
     {"threads", 'T', "N", 0, "worker threads (default all cores)", 2},
+    {"baseline", 'b', "WHICH", 0,
+     "log: what another simulator wrote into the log's sim_ columns, where there are any (default); table: our own replay", 1},
     {"quiet", 'q', NULL, 0, "no progress, no summary", 1},
     {0}};
 
@@ -72,6 +76,12 @@ static error_t parse(int key, char *argument, struct argp_state *state) {
         arguments->threads = atoi(argument);
         if (arguments->threads < 1 || arguments->threads > 1024) {
             argp_error(state, "--threads: '%s' is not a number from 1 to 1024", argument);
+        }
+        return 0;
+    case 'b':
+        arguments->own_baseline = strcmp(argument, "table") == 0;
+        if (!arguments->own_baseline && strcmp(argument, "log") != 0) {
+            argp_error(state, "--baseline: '%s' is neither log nor table", argument);
         }
         return 0;
     case 'q':
@@ -148,6 +158,21 @@ static int diagnose(const struct arguments *arguments, const struct gap_data *da
     return code;
 }
 
+/* Other simulators' columns, where there are any and they are wanted. */
+static int choose_baseline(const struct arguments *arguments, struct gap_data *data) {
+    char error[PROGRAM_ERROR_BYTES];
+    if (arguments->own_baseline || !gap_baseline_present(data)) {
+        return EXIT_OK;
+    }
+    if (arguments->calibration_out != NULL) {
+        return program_fail(EXIT_BAD_INPUT,
+                            "--calibration-out: the gap is another simulator's (%s has sim_ columns), and a calibration is of our own "
+                            "model: add --baseline table, or leave the option out",
+                            data->run[0].path);
+    }
+    return gap_baseline_use(data, error, sizeof error) ? EXIT_OK : program_fail(EXIT_BAD_INPUT, "%s", error);
+}
+
 static int run_diagnose(int argc, char **argv) {
     struct arguments arguments = {.count = 0};
     const struct argp parser = {option_list, parse, "RUN.csv...",
@@ -174,7 +199,8 @@ static int run_diagnose(int argc, char **argv) {
             code = program_fail(EXIT_BAD_INPUT, "%s is of module %s, but the table %s is of module %s: give that module's table with --table",
                                 arguments.logs[0], data.module, path, file.table.module.name);
         } else {
-            code = diagnose(&arguments, &data, &file.table);
+            code = choose_baseline(&arguments, &data);
+            code = code == EXIT_OK ? diagnose(&arguments, &data, &file.table) : code;
         }
         table_file_close(&file);
     }

@@ -6,6 +6,8 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "gap/baseline.h"
+
 #define DEGREES (180.0 / M_PI)
 #define NINETY_PERCENT 1.645
 /* A gap whose structure is below this share of the noise floor's square is none. */
@@ -21,8 +23,10 @@
 #define GROUP_LEAST 0.15 /* belief that puts a name into the group */
 #define SLUGGISH_SHARE 0.7
 #define SURE 0.65        /* belief above which one name is the verdict */
+#define SURE_ON_STRANGE 0.80 /* the same where another simulator errs in ways of its own */
 #define MOVES_LEAST_PA 1500.0 /* a recording in which no pressure moves by more says nothing */
 #define FLOOR_DOUBTFUL 10.0    /* neighbours differ by that many times the sensor's noise */
+#define DOUBTFUL_CHANGE 0.1    /* share of its movement by which our table model may miss another simulator's tip */
 #define CHUNK_S 2.5      /* of the bootstrap */
 #define RESAMPLES 400
 
@@ -397,6 +401,9 @@ static void take_effects(struct diagnosis *diagnosis, const struct search *searc
     size_t index = 2;
     diagnosis->stiffness_scale = interval_of(search, 0, model->stiffness_scale, 5e-4);
     diagnosis->supply_scale = interval_of(search, 1, model->supply_scale, 5e-4);
+    if (search->data->from_simulator) { /* its supply is in its pressures: there is nothing to fit */
+        diagnosis->supply_scale = (struct diagnosis_interval){1.0, 1.0, 1.0};
+    }
     for (size_t e = 0; e < model->count; e++) {
         const struct effect *effect = &model->effect[e];
         struct diagnosis_effect part = {.kind = effect->kind};
@@ -554,6 +561,13 @@ static bool says_nothing(struct diagnosis *diagnosis, const struct search *searc
     return true;
 }
 
+/* Does another simulator move in a way that our table model cannot follow? It is then likely to err smoothly, as bent fields
+ * and the like do, too. */
+static bool is_strange(const struct search *search) {
+    const struct replay_elsewhere *elsewhere = &search->replay.elsewhere;
+    return search->data->from_simulator && elsewhere->apart_m > DOUBTFUL_CHANGE * elsewhere->moves_m;
+}
+
 static void decide(struct diagnosis *diagnosis, const struct search *search) {
     const double before = diagnosis->structure[0], recalibrated = diagnosis->structure[1], best = diagnosis->structure[2];
     if (says_nothing(diagnosis, search)) {
@@ -575,7 +589,7 @@ static void decide(struct diagnosis *diagnosis, const struct search *search) {
         return;
     }
     for (size_t e = 0; e < diagnosis->effects; e++) {
-        if (diagnosis->effect[e].probability < SURE) {
+        if (diagnosis->effect[e].probability < (is_strange(search) ? SURE_ON_STRANGE : SURE)) {
             diagnosis->verdict = GAP_GROUP;
             return;
         }
@@ -583,8 +597,73 @@ static void decide(struct diagnosis *diagnosis, const struct search *search) {
     diagnosis->verdict = diagnosis->effects > 1 ? GAP_EFFECTS : GAP_EFFECT;
 }
 
+/* Effects that cannot act on another simulator's outputs, those with the same reason in one note. */
+static void describe_untried(struct diagnosis *diagnosis, const struct gap_data *data) {
+    const size_t kinds = effect_kind_count();
+    for (size_t i = 0; i < kinds; i++) {
+        const char *reason = gap_baseline_why_not(data, effect_kind_at(i));
+        char names[DIAGNOSIS_TEXT_BYTES] = "";
+        bool first = reason != NULL;
+        size_t used = 0;
+        for (size_t j = 0; j < kinds && first; j++) {
+            const char *other = gap_baseline_why_not(data, effect_kind_at(j));
+            const bool same = other != NULL && strcmp(other, reason) == 0;
+            first = !(same && j < i);
+            if (same && used < sizeof names) {
+                used += (size_t)snprintf(names + used, sizeof names - used, "%s%s", used > 0 ? ", " : "", effect_kind_at(j)->name);
+            }
+        }
+        if (first) {
+            diagnosis_warn(diagnosis, "not tried: %s; %s", names, reason);
+        }
+    }
+}
+
+static void describe_baseline(struct diagnosis *diagnosis, const struct search *search) {
+    const struct gap_data *data = search->data;
+    const struct gap_run *run = &data->run[0];
+    const struct replay_elsewhere *elsewhere = &search->replay.elsewhere;
+    size_t rows = 0, tips = 0;
+    for (size_t i = 0; i < data->runs; i++) {
+        rows += data->run[i].rows_without_sim;
+        tips += data->run[i].tips_without_sim;
+    }
+    diagnosis_warn(diagnosis, "the baseline is another simulator's output (%s), not our replay; --baseline table takes our replay",
+                   run->sim_pa == NULL    ? "sim_tip_x_m .."
+                   : run->sim_tip == NULL ? "sim_p1_pa .."
+                                          : "sim_tip_x_m .. and sim_p1_pa ..");
+    if (run->sim_tip != NULL && elsewhere->stiffness_scale > 0.0 && elsewhere->moves_m > 0.0) {
+        diagnosis_warn(diagnosis,
+                       "effects on the body are tried as the change that they make in our table model, which moves most like the other "
+                       "simulator with stiffness x %.3g: their tips, %.2g mm rms about their means, then differ by %.2g mm%s",
+                       elsewhere->stiffness_scale, 1e3 * elsewhere->moves_m, 1e3 * elsewhere->apart_m,
+                       is_strange(search)
+                           ? ", so that the sizes found for body effects are rough"
+                           : "");
+    }
+    if (run->sim_is_copy) {
+        diagnosis_warn(diagnosis, "sim_p1_pa to sim_p3_pa repeat the measured pressures: they count as not simulated");
+    } else if (run->sim_pa == NULL) {
+        diagnosis_warn(diagnosis, "the other simulator gives no pressures: its tip is taken to be that of the measured ones");
+    }
+    if (run->sim_tip == NULL) {
+        diagnosis_warn(diagnosis, "the other simulator gives no tip: only pressures are compared");
+    } else if (!run->has_orientation && run->tips > 0) {
+        diagnosis_warn(diagnosis, "the tip is compared by its position alone: body and tip sensor are hard to tell apart");
+    }
+    if (rows > 0 || tips > 2 * data->runs) { /* one or two at either end of a run are no loss */
+        diagnosis_warn(diagnosis, "%zu rows with pressures and %zu tip samples are left out: the other simulator says nothing there",
+                       rows, tips);
+    }
+    describe_untried(diagnosis, data);
+}
+
 static void describe_data(struct diagnosis *diagnosis, const struct search *search) {
     const struct gap_run *run = &search->data->run[0];
+    if (search->data->from_simulator) {
+        describe_baseline(diagnosis, search);
+        return;
+    }
     if (!run->has_duty) {
         diagnosis_warn(diagnosis, "no duties in the log: supply, valve and line effects cannot be told apart; record valve1..3");
     }

@@ -5,6 +5,7 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "gap/baseline.h"
 #include "log/run_log.h"
 #include "safety/supervisor.h"
 
@@ -159,7 +160,7 @@ static bool take_log(struct gap_run *run, const struct run_log *log, char *error
     }
     count_repeats(run);
     find_cuts(run, log);
-    return true;
+    return gap_baseline_take(run, log, error, error_bytes);
 }
 
 static double greatest_of(const double *value, size_t count) {
@@ -242,6 +243,7 @@ double gap_data_repeated_share(const struct gap_data *data) {
 void gap_data_free(struct gap_data *data) {
     for (size_t i = 0; i < data->runs; i++) {
         struct gap_run *run = &data->run[i];
+        gap_baseline_free(run);
         free(run->time_s);
         free(run->duty);
         free(run->reading_pa);

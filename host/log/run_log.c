@@ -203,6 +203,7 @@ static bool read_preamble(struct reader *reader, struct run_log *log) {
     }
     while (next_line(reader)) {
         if (reader->line[0] != '#') {
+            log->header_line = (size_t)reader->line_number;
             return read_header(reader, log);
         }
         if (!read_metadata(reader, log)) {
