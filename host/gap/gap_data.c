@@ -6,6 +6,7 @@
 #include <string.h>
 
 #include "gap/baseline.h"
+#include "gap/unit_check.h"
 #include "log/run_log.h"
 #include "safety/supervisor.h"
 
@@ -163,44 +164,6 @@ static bool take_log(struct gap_run *run, const struct run_log *log, char *error
     return gap_baseline_take(run, log, error, error_bytes);
 }
 
-static double greatest_of(const double *value, size_t count) {
-    double most = 0.0;
-    for (size_t i = 0; i < count; i++) {
-        most = isnan(value[i]) ? most : fmax(most, fabs(value[i]));
-    }
-    return most;
-}
-
-/* Pressures of some pascals or positions of metres are somebody's bar, kPa or mm under our column's name. */
-static bool check_units(const struct gap_run *run, char *error, size_t error_bytes) {
-    const double reading_pa = greatest_of(run->reading_pa, 3 * run->rows);
-    const double least_pa = 500.0, most_pa = 2e6, most_m = 1.0;
-    double position_m = 0.0;
-    for (size_t i = 0; i < run->tips; i++) {
-        position_m = fmax(position_m, greatest_of(run->tip[i].position_m, 3));
-    }
-    if (run->has_reading && reading_pa > 0.0 && reading_pa < least_pa) {
-        (void)snprintf(error, error_bytes,
-                       "%s: the greatest of p1_pa to p3_pa is %.3g: that looks like %s, not Pa; multiply the columns by %.0f, or "
-                       "import the recording with a mapping that names its unit",
-                       run->path, reading_pa, reading_pa < 5.0 ? "bar" : "kPa", reading_pa < 5.0 ? 1e5 : 1e3);
-        return false;
-    }
-    if (reading_pa > most_pa) {
-        (void)snprintf(error, error_bytes, "%s: the greatest of p1_pa to p3_pa is %.3g Pa: is it absolute, or in another unit?",
-                       run->path, reading_pa);
-        return false;
-    }
-    if (position_m > most_m) {
-        (void)snprintf(error, error_bytes,
-                       "%s: the greatest of tip_x_m to tip_z_m is %.3g: that looks like mm, not m; divide the columns by 1000, or "
-                       "import the recording with a mapping that names its unit",
-                       run->path, position_m);
-        return false;
-    }
-    return true;
-}
-
 bool gap_data_read(struct gap_data *data, const char *const *paths, size_t count, char *error, size_t error_bytes) {
     memset(data, 0, sizeof *data);
     if (count == 0 || count > GAP_RUNS_MAX) {
@@ -220,7 +183,7 @@ bool gap_data_read(struct gap_data *data, const char *const *paths, size_t count
                                log.module, paths[0], data->module);
                 taken = false;
             }
-            taken = taken && take_log(run, &log, error, error_bytes) && check_units(run, error, error_bytes);
+            taken = taken && unit_check(paths[i], &log, error, error_bytes) && take_log(run, &log, error, error_bytes);
             run_log_free(&log);
         }
         if (!taken) {
