@@ -8,10 +8,13 @@
 #include "cli/commands.h"
 #include "gap/baseline.h"
 #include "gap/diagnosis.h"
+#include "gap/log_check.h"
 #include "gap/report.h"
 #include "gap/report_html.h"
 
 #define WITHOUT_MAX 32
+
+enum { TRUST_COLUMNS = 0x100 };
 
 struct arguments {
     const char *logs[GAP_RUNS_MAX];
@@ -25,6 +28,7 @@ struct arguments {
     size_t without_count;
     int threads;
     bool own_baseline;
+    bool trust_columns;
     bool quiet;
 };
 
@@ -38,6 +42,7 @@ static const struct argp_option option_list[] = {
     {"threads", 'T', "N", 0, "worker threads (default all cores)", 2},
     {"baseline", 'b', "WHICH", 0,
      "log: what another simulator wrote into the log's sim_ columns, where there are any (default); table: our own replay", 1},
+    {"trust-columns", TRUST_COLUMNS, NULL, 0, "diagnose even a log whose chambers or frame do not fit the module", 2},
     {"quiet", 'q', NULL, 0, "no progress, no summary", 1},
     {0}};
 
@@ -83,6 +88,9 @@ static error_t parse(int key, char *argument, struct argp_state *state) {
         if (!arguments->own_baseline && strcmp(argument, "log") != 0) {
             argp_error(state, "--baseline: '%s' is neither log nor table", argument);
         }
+        return 0;
+    case TRUST_COLUMNS:
+        arguments->trust_columns = true;
         return 0;
     case 'q':
         arguments->quiet = true;
@@ -143,7 +151,11 @@ static int diagnose(const struct arguments *arguments, const struct gap_data *da
     int code = EXIT_OK;
     plant_default_parameters(&nominal);
     program_catch_interrupt();
-    if (search == NULL || diagnosis == NULL || !search_run(search, data, table, &nominal, &options) ||
+    char error[PROGRAM_ERROR_BYTES];
+    if (search != NULL && diagnosis != NULL && !arguments->trust_columns &&
+        !log_check(data, table, &nominal, error, sizeof error)) {
+        code = program_fail(EXIT_BAD_INPUT, "%s", error);
+    } else if (search == NULL || diagnosis == NULL || !search_run(search, data, table, &nominal, &options) ||
         !diagnosis_conclude(diagnosis, search)) {
         code = program_interrupted ? EXIT_INTERRUPTED : program_fail(EXIT_SOLVER, "out of memory for the diagnosis");
     } else {

@@ -1,5 +1,6 @@
 #include "gap/diagnosis.h"
 
+#include <inttypes.h>
 #include <math.h>
 #include <stdarg.h>
 #include <stdio.h>
@@ -676,6 +677,13 @@ static void describe_baseline(struct diagnosis *diagnosis, const struct search *
 
 static void describe_data(struct diagnosis *diagnosis, const struct search *search) {
     const struct gap_run *run = &search->data->run[0];
+    const uint64_t hash = search->replay.table->module.inputs_hash;
+    if (run->table_hash != 0 && run->table_hash != hash) {
+        diagnosis_warn(diagnosis,
+                       "recorded with table %016" PRIx64 ", diagnosed with table %016" PRIx64 " of the same module: set-points came from "
+                       "another model, and so may what the module is; --table takes another",
+                       run->table_hash, hash);
+    }
     if (search->data->from_simulator) {
         describe_baseline(diagnosis, search);
         return;

@@ -131,7 +131,10 @@ static bool take_log(struct gap_run *run, const struct run_log *log, char *error
     static const char *const tips[8] = {"tip_x_m", "tip_y_m", "tip_z_m", "tip_qw",
                                         "tip_qx",  "tip_qy",  "tip_qz",  "tip_status"};
     int tip_column[8];
+    const char *table_hash = run_log_metadata(log, "table");
     run->rows = log->rows;
+    run->header_line = log->header_line;
+    run->table_hash = table_hash != NULL ? strtoull(table_hash, NULL, 16) : 0;
     run->time_s = malloc(log->rows * sizeof(double));
     run->duty = malloc(3 * log->rows * sizeof(double));
     run->reading_pa = malloc(3 * log->rows * sizeof(double));

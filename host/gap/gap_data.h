@@ -26,6 +26,8 @@ struct gap_simulator;
 
 struct gap_run {
     char path[GAP_PATH_BYTES];
+    size_t header_line;    /* in the file */
+    uint64_t table_hash;   /* of the table that the controller had; 0: the log does not say */
     size_t rows;
     double *time_s;
     double *duty;          /* [rows * 3]; holds from its row on */
