@@ -264,7 +264,7 @@ static struct finding order_of_tips(const struct bend_table *table, const struct
     double rest[ORDERS], turned = 1.0, turn_rad = 0.0, moves2 = 0.0;
     for (size_t o = 0; o < ORDERS; o++) {
         rest[o] = 1.0;
-        for (size_t s = 0; s < STIFFNESSES; s++) {
+        for (size_t s = 0; s < STIFFNESSES && !(o > 0 && rest[0] <= BAD); s++) { /* as it is, it is good enough */
             struct likeness sum = {.count = 0.0};
             for (size_t i = 0; i < count; i++) {
                 double load_pa[3];

@@ -185,6 +185,19 @@ expect log_of_one_row 3 'one.csv' "$tribend" gap diagnose -q "$(log one 'if (n >
 expect log_of_another_module 3 'is of module other' "$tribend" gap diagnose -q "$(sed 's/^# module: .*/# module: other/' "$scratch/good.csv" >"$scratch/other.csv"; echo "$scratch/other.csv")"
 expect effect_left_out_is_none 2 'no effect' "$tribend" gap diagnose -q --without nothing "$scratch/good.csv"
 
+echo "[ RUN      ] log_without_movement_is_insufficient"
+log still 'for (i = 5; i <= 10; i++) $i = 3000 + (n * 37) % 11; $2 = $3 = $4 = 0.3' >/dev/null
+if "$tribend" gap diagnose "$scratch/still.csv" >"$scratch/stdout" 2>&1 && grep -q '^verdict *insufficient-data' "$scratch/stdout" &&
+    grep -q 'pressures never move' "$scratch/stdout"; then
+    echo "[       OK ] log_without_movement_is_insufficient"
+    passed=$((passed + 1))
+else
+    cat "$scratch/stdout"
+    echo "[  FAILED  ] log_without_movement_is_insufficient"
+    failed=$((failed + 1))
+fi
+expect log_of_exchanged_chambers 3 'exchanged.csv:[0-9]+: the log.s chambers look exchanged: p1 and p2 .*swap columns p1_pa and p2_pa and repeat' "$tribend" gap diagnose -q "$(log exchanged 't = $8; $8 = $9; $9 = t')"
+
 # --- calibrations: test_calibration.c has the messages; here, that each program gives them
 cat >"$scratch/soft.yaml" <<'YAML'
 module: paper-semicircle
