@@ -25,6 +25,7 @@
 #define SLUGGISH_SHARE 0.7
 #define SURE 0.65        /* belief above which one name is the verdict */
 #define SURE_ON_STRANGE 0.80 /* the same where another simulator errs in ways of its own */
+#define PRESSURE_SHARE 0.02   /* a rival that leaves so much more of the pressures' gap is e times less believed */
 #define MOVES_LEAST_PA 1500.0 /* a recording in which no pressure moves by more says nothing */
 #define FLOOR_DOUBTFUL 10.0    /* neighbours differ by that many times the sensor's noise */
 #define DOUBTFUL_CHANGE 0.1    /* share of its movement by which our table model may miss another simulator's tip */
@@ -585,11 +586,81 @@ static double least_closed(const struct diagnosis *diagnosis, const struct searc
     return bends ? CLOSED_LEAST_BY_MANY : CLOSED_LEAST;
 }
 
+static double pressure_squares(const struct fit *fit) {
+    return fit->sums.part[1][FIT_PRESSURE].square;
+}
+
+/* Belief in a kind among its rivals by what each leaves of the pressures alone. */
+static double belief_by_pressures(const struct search *search, const struct diagnosis_effect *effect) {
+    for (size_t r = 0; r < search->rivals_count; r++) {
+        const struct rivals *rivals = &search->rivals[r];
+        double least = pressure_squares(&search->best), own = 0.0, sum = 0.0;
+        if (rivals->place != effect->place) {
+            continue;
+        }
+        for (size_t i = 0; i < rivals->count; i++) {
+            least = fmin(least, pressure_squares(&rivals->rival[i].fit));
+        }
+        const struct fit_part *part = &search->best.sums.part[1][FIT_PRESSURE];
+        const double noise = part->noise_count > 0.0 ? part->noise / part->noise_count : 1.0;
+        const double scale = PRESSURE_SHARE * fmax(pressure_squares(&search->recalibrated) - least, 0.0) + 4.0 * noise;
+        for (size_t i = 0; i < rivals->count; i++) {
+            const double belief = exp(-(pressure_squares(&rivals->rival[i].fit) - least) / scale);
+            sum += belief;
+            own += rivals->rival[i].kind == effect->kind ? belief : 0.0;
+        }
+        return sum > 0.0 ? own / sum : 0.0;
+    }
+    return 0.0;
+}
+
+/* Another simulator may err at the tip and yet have the right pressures: what explains these then stands, and the rest is said
+ * to be unexplained. */
+static bool keep_sensor_effects(struct diagnosis *diagnosis, const struct search *search) {
+    const double before = fit_structure_of(&search->recalibrated.sums, 1, FIT_PRESSURE);
+    const double after = fit_structure_of(&search->best.sums, 1, FIT_PRESSURE);
+    size_t kept = 0;
+    if (!is_strange(search) || before <= STRUCTURE_NONE || after > fmax(STRUCTURE_NONE, (1.0 - CLOSED_LEAST) * before)) {
+        return false;
+    }
+    for (size_t e = 0; e < diagnosis->effects; e++) {
+        if (diagnosis->effect[e].kind->stage == EFFECT_STAGE_PRESSURE_SENSOR) {
+            diagnosis->effect[kept] = diagnosis->effect[e];
+            diagnosis->effect[kept].probability = belief_by_pressures(search, &diagnosis->effect[kept]);
+            kept++;
+        }
+    }
+    if (kept == 0) {
+        return false;
+    }
+    for (size_t e = 0; e < kept; e++) {
+        if (diagnosis->effect[e].probability < SURE_ON_STRANGE) { /* nothing that one could name */
+            return false;
+        }
+    }
+    diagnosis->effects = kept;
+    diagnosis->group = 0;
+    memset(diagnosis->chamber, 0, sizeof diagnosis->chamber);
+    locate(diagnosis);
+    diagnosis_warn(diagnosis, "what is named explains the pressures; the tip is left with %.2g mm rms that nothing explains, or an error of "
+                   "the other simulator",
+                   diagnosis->gap[1].after_effect);
+    return true;
+}
+
 static void decide(struct diagnosis *diagnosis, const struct search *search) {
     const double before = diagnosis->structure[0], recalibrated = diagnosis->structure[1], best = diagnosis->structure[2];
     if (says_nothing(diagnosis, search)) {
         diagnosis->verdict = GAP_INSUFFICIENT_DATA;
         diagnosis->effects = 0;
+        return;
+    }
+    if (search->data->from_simulator && fmax(before, recalibrated) <= STRUCTURE_NONE) {
+        diagnosis->verdict = GAP_NONE; /* what the search made of so little is nothing */
+        diagnosis->effects = 0;
+        diagnosis->group = 0;
+        diagnosis->stage = "";
+        memset(diagnosis->chamber, 0, sizeof diagnosis->chamber);
         return;
     }
     if (search->best.model.count == 0) {
@@ -601,7 +672,8 @@ static void decide(struct diagnosis *diagnosis, const struct search *search) {
         return;
     }
     const double least = least_closed(diagnosis, search);
-    if (best > STRUCTURE_NONE + (1.0 - least) * recalibrated) {
+    const bool unexplained = best > STRUCTURE_NONE + (1.0 - least) * recalibrated;
+    if (unexplained && !keep_sensor_effects(diagnosis, search)) {
         diagnosis->verdict = GAP_UNKNOWN;
         return;
     }

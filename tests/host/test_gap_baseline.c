@@ -347,7 +347,10 @@ static void a_pressure_sensor_is_found_although_the_simulator_errs(void **state)
     diagnose();
     assert_found("pressure_offset");
     assert_int_equal(diagnosis.effect[0].chamber, 2);
-    assert_parameter(0, 1800.0, 0.2);
+    assert_parameter(0, 1800.0, 0.05);
+    assert_string_equal(diagnosis.stage, "pressure sensor");
+    assert_true(diagnosis.chamber[1] && !diagnosis.chamber[0]);
+    assert_true(is_noted("the tip is left with"));
     forget();
 }
 
