@@ -57,7 +57,7 @@ static bool reject_missing(const struct gap_run *run, const char *missing, const
 
 static bool take_pose(const struct gap_run *run, const struct run_log *log, size_t row, const int column[7],
                       struct gap_simulator *simulator, char *error, size_t error_bytes) {
-    struct gap_pose pose;
+    struct gap_pose pose = {{NAN, NAN, NAN}, {NAN, NAN, NAN, NAN}};
     double size = 0.0;
     for (size_t k = 0; k < 7; k++) {
         const double value = column[k] < 0 ? NAN : log->value[row * log->columns + (size_t)column[k]];

@@ -6,7 +6,8 @@
 #define MATCHED_TIPS 400     /* of a run, that tell the stiffness */
 #define STIFFNESS_LEAST 0.25
 #define STIFFNESS_MOST 4.0
-#define GRID 33
+#define GRID 33              /* stiffnesses tried at first, evenly in their logarithm; then .. */
+#define HALVINGS 8           /* .. beside the best, at ever smaller steps */
 #define MOVES_LEAST_M 1e-3   /* rms: less says nothing of the stiffness */
 
 static double between(const double *value, size_t steps, double position) {
@@ -177,7 +178,8 @@ void replay_elsewhere_match(struct replay *replay, const struct replay_state *st
         best = square < least ? scale : best;
         least = fmin(least, square);
     }
-    for (double width = ratio; width > 1.0005; width = sqrt(width)) { /* a parabola is not needed: halve the steps */
+    double width = ratio;
+    for (int halving = 0; halving < HALVINGS; halving++, width = sqrt(width)) {
         for (int side = -1; side <= 1; side += 2) {
             const double scale = best * pow(width, 0.5 * side), square = apart_at(replay, state, scale).square;
             if (square < least) {
