@@ -6,11 +6,15 @@
 #include <unistd.h>
 
 #include "cli/commands.h"
+#include "gap/baseline.h"
 #include "gap/diagnosis.h"
+#include "gap/log_check.h"
 #include "gap/report.h"
 #include "gap/report_html.h"
 
 #define WITHOUT_MAX 32
+
+enum { TRUST_COLUMNS = 0x100 };
 
 struct arguments {
     const char *logs[GAP_RUNS_MAX];
@@ -23,6 +27,8 @@ struct arguments {
     const char *without[WITHOUT_MAX];
     size_t without_count;
     int threads;
+    bool own_baseline;
+    bool trust_columns;
     bool quiet;
 };
 
@@ -34,6 +40,9 @@ static const struct argp_option option_list[] = {
     {"calibration-out", 'c', "FILE", 0, "write what was found as a calibration (YAML)", 1},
     {"without", 'w', "NAME", 0, "do not try this effect; may be repeated", 2},
     {"threads", 'T', "N", 0, "worker threads (default all cores)", 2},
+    {"baseline", 'b', "WHICH", 0,
+     "log: what another simulator wrote into the log's sim_ columns, where there are any (default); table: our own replay", 1},
+    {"trust-columns", TRUST_COLUMNS, NULL, 0, "diagnose even a log whose chambers or frame do not fit the module", 2},
     {"quiet", 'q', NULL, 0, "no progress, no summary", 1},
     {0}};
 
@@ -73,6 +82,15 @@ static error_t parse(int key, char *argument, struct argp_state *state) {
         if (arguments->threads < 1 || arguments->threads > 1024) {
             argp_error(state, "--threads: '%s' is not a number from 1 to 1024", argument);
         }
+        return 0;
+    case 'b':
+        arguments->own_baseline = strcmp(argument, "table") == 0;
+        if (!arguments->own_baseline && strcmp(argument, "log") != 0) {
+            argp_error(state, "--baseline: '%s' is neither log nor table", argument);
+        }
+        return 0;
+    case TRUST_COLUMNS:
+        arguments->trust_columns = true;
         return 0;
     case 'q':
         arguments->quiet = true;
@@ -133,7 +151,11 @@ static int diagnose(const struct arguments *arguments, const struct gap_data *da
     int code = EXIT_OK;
     plant_default_parameters(&nominal);
     program_catch_interrupt();
-    if (search == NULL || diagnosis == NULL || !search_run(search, data, table, &nominal, &options) ||
+    char error[PROGRAM_ERROR_BYTES];
+    if (search != NULL && diagnosis != NULL && !arguments->trust_columns &&
+        !log_check(data, table, &nominal, error, sizeof error)) {
+        code = program_fail(EXIT_BAD_INPUT, "%s", error);
+    } else if (search == NULL || diagnosis == NULL || !search_run(search, data, table, &nominal, &options) ||
         !diagnosis_conclude(diagnosis, search)) {
         code = program_interrupted ? EXIT_INTERRUPTED : program_fail(EXIT_SOLVER, "out of memory for the diagnosis");
     } else {
@@ -146,6 +168,21 @@ static int diagnose(const struct arguments *arguments, const struct gap_data *da
     free(search);
     free(diagnosis);
     return code;
+}
+
+/* Other simulators' columns, where there are any and they are wanted. */
+static int choose_baseline(const struct arguments *arguments, struct gap_data *data) {
+    char error[PROGRAM_ERROR_BYTES];
+    if (arguments->own_baseline || !gap_baseline_present(data)) {
+        return EXIT_OK;
+    }
+    if (arguments->calibration_out != NULL) {
+        return program_fail(EXIT_BAD_INPUT,
+                            "--calibration-out: the gap is another simulator's (%s has sim_ columns), and a calibration is of our own "
+                            "model: add --baseline table, or leave the option out",
+                            data->run[0].path);
+    }
+    return gap_baseline_use(data, error, sizeof error) ? EXIT_OK : program_fail(EXIT_BAD_INPUT, "%s", error);
 }
 
 static int run_diagnose(int argc, char **argv) {
@@ -174,7 +211,8 @@ static int run_diagnose(int argc, char **argv) {
             code = program_fail(EXIT_BAD_INPUT, "%s is of module %s, but the table %s is of module %s: give that module's table with --table",
                                 arguments.logs[0], data.module, path, file.table.module.name);
         } else {
-            code = diagnose(&arguments, &data, &file.table);
+            code = choose_baseline(&arguments, &data);
+            code = code == EXIT_OK ? diagnose(&arguments, &data, &file.table) : code;
         }
         table_file_close(&file);
     }

@@ -1,10 +1,13 @@
 #include "gap/diagnosis.h"
 
+#include <inttypes.h>
 #include <math.h>
 #include <stdarg.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
+
+#include "gap/baseline.h"
 
 #define DEGREES (180.0 / M_PI)
 #define NINETY_PERCENT 1.645
@@ -25,8 +28,11 @@
 #define GROUP_LEAST 0.15 /* belief that puts a name into the group */
 #define SLUGGISH_SHARE 0.7
 #define SURE 0.65        /* belief above which one name is the verdict */
+#define SURE_ON_STRANGE 0.80 /* the same where another simulator errs in ways of its own */
+#define PRESSURE_SHARE 0.02   /* a rival that leaves so much more of the pressures' gap is e times less believed */
 #define MOVES_LEAST_PA 1500.0 /* a recording in which no pressure moves by more says nothing */
 #define FLOOR_DOUBTFUL 10.0    /* neighbours differ by that many times the sensor's noise */
+#define DOUBTFUL_CHANGE 0.1    /* share of its movement by which our table model may miss another simulator's tip */
 #define CHUNK_S 2.5      /* of the bootstrap */
 #define RESAMPLES 400
 
@@ -430,6 +436,9 @@ static void take_effects(struct diagnosis *diagnosis, const struct search *searc
     size_t index = 2;
     diagnosis->stiffness_scale = interval_of(search, 0, model->stiffness_scale, 5e-4);
     diagnosis->supply_scale = interval_of(search, 1, model->supply_scale, 5e-4);
+    if (search->data->from_simulator) { /* its supply is in its pressures: there is nothing to fit */
+        diagnosis->supply_scale = (struct diagnosis_interval){1.0, 1.0, 1.0};
+    }
     for (size_t e = 0; e < model->count; e++) {
         const struct effect *effect = &model->effect[e];
         struct diagnosis_effect part = {.kind = effect->kind};
@@ -488,7 +497,7 @@ static double moves_of(const struct gap_data *data, size_t chamber) {
     double moves_pa = 0.0;
     for (size_t i = 0; i < data->runs; i++) {
         const struct gap_run *run = &data->run[i];
-        const double *value = run->has_reading ? run->reading_pa : run->command_pa;
+        const double *value = run->has_reading ? run->reading_pa : run->sim_pa != NULL ? run->sim_pa : run->command_pa;
         double least = INFINITY, most = -INFINITY;
         for (size_t row = 0; row < run->rows; row++) {
             least = fmin(least, value[3 * row + chamber]); /* a NaN changes neither */
@@ -573,9 +582,15 @@ static void locate(struct diagnosis *diagnosis) {
 
 /* --- verdict --- */
 
-/* Held pressures that never move tell stiffness from nothing. */
+/* Held pressures that never move tell stiffness from nothing. Where no pressure is known, nothing is said of them. */
 static bool says_nothing(struct diagnosis *diagnosis, const struct search *search) {
     double most_pa = 0.0;
+    for (size_t i = 0; i < search->data->runs; i++) {
+        const struct gap_run *run = &search->data->run[i];
+        if (!run->has_reading && !run->has_command && run->sim_pa == NULL) {
+            return false;
+        }
+    }
     for (size_t c = 0; c < 3; c++) {
         most_pa = fmax(most_pa, moves_of(search->data, c));
     }
@@ -587,11 +602,98 @@ static bool says_nothing(struct diagnosis *diagnosis, const struct search *searc
     return true;
 }
 
+/* Does another simulator move in a way that our table model cannot follow? It is then likely to err smoothly, as bent fields
+ * and the like do, too. */
+static bool is_strange(const struct search *search) {
+    const struct replay_elsewhere *elsewhere = &search->replay.elsewhere;
+    return search->data->from_simulator && elsewhere->apart_m > DOUBTFUL_CHANGE * elsewhere->moves_m;
+}
+
+/* Share of the structure that the effects must close. What a simulator errs by looks like effects of body and tip, which can bend
+ * to it nearly as well as several of them together can to anything; it does not look like a pressure sensor's. */
+static double least_closed(const struct diagnosis *diagnosis, const struct search *search) {
+    bool bends = diagnosis->effects > 1 || search->best.model.count > FEW_PARTS;
+    for (size_t e = 0; e < diagnosis->effects && is_strange(search); e++) {
+        bends = bends || diagnosis->effect[e].kind->stage != EFFECT_STAGE_PRESSURE_SENSOR;
+    }
+    return bends ? CLOSED_LEAST_BY_MANY : CLOSED_LEAST;
+}
+
+static double pressure_squares(const struct fit *fit) {
+    return fit->sums.part[1][FIT_PRESSURE].square;
+}
+
+/* Belief in a kind among its rivals by what each leaves of the pressures alone. */
+static double belief_by_pressures(const struct search *search, const struct diagnosis_effect *effect) {
+    for (size_t r = 0; r < search->rivals_count; r++) {
+        const struct rivals *rivals = &search->rivals[r];
+        double least = pressure_squares(&search->best), own = 0.0, sum = 0.0;
+        if (rivals->place != effect->place) {
+            continue;
+        }
+        for (size_t i = 0; i < rivals->count; i++) {
+            least = fmin(least, pressure_squares(&rivals->rival[i].fit));
+        }
+        const struct fit_part *part = &search->best.sums.part[1][FIT_PRESSURE];
+        const double noise = part->noise_count > 0.0 ? part->noise / part->noise_count : 1.0;
+        const double scale = PRESSURE_SHARE * fmax(pressure_squares(&search->recalibrated) - least, 0.0) + 4.0 * noise;
+        for (size_t i = 0; i < rivals->count; i++) {
+            const double belief = exp(-(pressure_squares(&rivals->rival[i].fit) - least) / scale);
+            sum += belief;
+            own += rivals->rival[i].kind == effect->kind ? belief : 0.0;
+        }
+        return sum > 0.0 ? own / sum : 0.0;
+    }
+    return 0.0;
+}
+
+/* Another simulator may err at the tip and yet have the right pressures: what explains these then stands, and the rest is said
+ * to be unexplained. */
+static bool keep_sensor_effects(struct diagnosis *diagnosis, const struct search *search) {
+    const double before = fit_structure_of(&search->recalibrated.sums, 1, FIT_PRESSURE);
+    const double after = fit_structure_of(&search->best.sums, 1, FIT_PRESSURE);
+    size_t kept = 0;
+    if (!is_strange(search) || before <= STRUCTURE_NONE || after > fmax(STRUCTURE_NONE, (1.0 - CLOSED_LEAST) * before)) {
+        return false;
+    }
+    for (size_t e = 0; e < diagnosis->effects; e++) {
+        if (diagnosis->effect[e].kind->stage == EFFECT_STAGE_PRESSURE_SENSOR) {
+            diagnosis->effect[kept] = diagnosis->effect[e];
+            diagnosis->effect[kept].probability = belief_by_pressures(search, &diagnosis->effect[kept]);
+            kept++;
+        }
+    }
+    if (kept == 0) {
+        return false;
+    }
+    for (size_t e = 0; e < kept; e++) {
+        if (diagnosis->effect[e].probability < SURE_ON_STRANGE) { /* nothing that one could name */
+            return false;
+        }
+    }
+    diagnosis->effects = kept;
+    diagnosis->group = 0;
+    memset(diagnosis->chamber, 0, sizeof diagnosis->chamber);
+    locate(diagnosis);
+    diagnosis_warn(diagnosis, "what is named explains the pressures; the tip is left with %.2g mm rms that nothing explains, or an error of "
+                   "the other simulator",
+                   diagnosis->gap[1].after_effect);
+    return true;
+}
+
 static void decide(struct diagnosis *diagnosis, const struct search *search) {
     const double before = diagnosis->structure[0], recalibrated = diagnosis->structure[1], best = diagnosis->structure[2];
     if (says_nothing(diagnosis, search)) {
         diagnosis->verdict = GAP_INSUFFICIENT_DATA;
         diagnosis->effects = 0;
+        return;
+    }
+    if (search->data->from_simulator && fmax(before, recalibrated) <= STRUCTURE_NONE) {
+        diagnosis->verdict = GAP_NONE; /* what the search made of so little is nothing */
+        diagnosis->effects = 0;
+        diagnosis->group = 0;
+        diagnosis->stage = "";
+        memset(diagnosis->chamber, 0, sizeof diagnosis->chamber);
         return;
     }
     if (search->best.model.count == 0) {
@@ -602,14 +704,14 @@ static void decide(struct diagnosis *diagnosis, const struct search *search) {
         }
         return;
     }
-    const bool bends_to_much = diagnosis->effects > 1 || search->best.model.count > FEW_PARTS;
-    const double least = bends_to_much ? CLOSED_LEAST_BY_MANY : CLOSED_LEAST;
-    if (best > STRUCTURE_NONE + (1.0 - least) * recalibrated) {
+    const double least = least_closed(diagnosis, search);
+    const bool unexplained = best > STRUCTURE_NONE + (1.0 - least) * recalibrated;
+    if (unexplained && !keep_sensor_effects(diagnosis, search)) {
         diagnosis->verdict = GAP_UNKNOWN;
         return;
     }
     for (size_t e = 0; e < diagnosis->effects; e++) {
-        if (diagnosis->effect[e].probability < SURE) {
+        if (diagnosis->effect[e].probability < (is_strange(search) ? SURE_ON_STRANGE : SURE)) {
             diagnosis->verdict = GAP_GROUP;
             return;
         }
@@ -617,8 +719,80 @@ static void decide(struct diagnosis *diagnosis, const struct search *search) {
     diagnosis->verdict = diagnosis->effects > 1 ? GAP_EFFECTS : GAP_EFFECT;
 }
 
+/* Effects that cannot act on another simulator's outputs, those with the same reason in one note. */
+static void describe_untried(struct diagnosis *diagnosis, const struct gap_data *data) {
+    const size_t kinds = effect_kind_count();
+    for (size_t i = 0; i < kinds; i++) {
+        const char *reason = gap_baseline_why_not(data, effect_kind_at(i));
+        char names[DIAGNOSIS_TEXT_BYTES] = "";
+        bool first = reason != NULL;
+        size_t used = 0;
+        for (size_t j = 0; j < kinds && first; j++) {
+            const char *other = gap_baseline_why_not(data, effect_kind_at(j));
+            const bool same = other != NULL && strcmp(other, reason) == 0;
+            first = !(same && j < i);
+            if (same && used < sizeof names) {
+                used += (size_t)snprintf(names + used, sizeof names - used, "%s%s", used > 0 ? ", " : "", effect_kind_at(j)->name);
+            }
+        }
+        if (first) {
+            diagnosis_warn(diagnosis, "not tried: %s; %s", names, reason);
+        }
+    }
+}
+
+static void describe_baseline(struct diagnosis *diagnosis, const struct search *search) {
+    const struct gap_data *data = search->data;
+    const struct gap_run *run = &data->run[0];
+    const struct replay_elsewhere *elsewhere = &search->replay.elsewhere;
+    size_t rows = 0, tips = 0;
+    for (size_t i = 0; i < data->runs; i++) {
+        rows += data->run[i].rows_without_sim;
+        tips += data->run[i].tips_without_sim;
+    }
+    diagnosis_warn(diagnosis, "the baseline is another simulator's output (%s), not our replay; --baseline table takes our replay",
+                   run->sim_pa == NULL    ? "sim_tip_x_m .."
+                   : run->sim_tip == NULL ? "sim_p1_pa .."
+                                          : "sim_tip_x_m .. and sim_p1_pa ..");
+    if (run->sim_tip != NULL && elsewhere->stiffness_scale > 0.0 && elsewhere->moves_m > 0.0) {
+        diagnosis_warn(diagnosis,
+                       "effects on the body are tried as the change that they make in our table model, which moves most like the other "
+                       "simulator with stiffness x %.3g: their tips, %.2g mm rms about their means, then differ by %.2g mm%s",
+                       elsewhere->stiffness_scale, 1e3 * elsewhere->moves_m, 1e3 * elsewhere->apart_m,
+                       is_strange(search)
+                           ? ", so that the sizes found for body effects are rough"
+                           : "");
+    }
+    if (run->sim_is_copy) {
+        diagnosis_warn(diagnosis, "sim_p1_pa to sim_p3_pa repeat the measured pressures: they count as not simulated");
+    } else if (run->sim_pa == NULL) {
+        diagnosis_warn(diagnosis, "the other simulator gives no pressures: its tip is taken to be that of the measured ones");
+    }
+    if (run->sim_tip == NULL) {
+        diagnosis_warn(diagnosis, "the other simulator gives no tip: only pressures are compared");
+    } else if (!run->has_orientation && run->tips > 0) {
+        diagnosis_warn(diagnosis, "the tip is compared by its position alone: body and tip sensor are hard to tell apart");
+    }
+    if (rows > 0 || tips > 2 * data->runs) { /* one or two at either end of a run are no loss */
+        diagnosis_warn(diagnosis, "%zu rows with pressures and %zu tip samples are left out: the other simulator says nothing there",
+                       rows, tips);
+    }
+    describe_untried(diagnosis, data);
+}
+
 static void describe_data(struct diagnosis *diagnosis, const struct search *search) {
     const struct gap_run *run = &search->data->run[0];
+    const uint64_t hash = search->replay.table->module.inputs_hash;
+    if (run->table_hash != 0 && run->table_hash != hash) {
+        diagnosis_warn(diagnosis,
+                       "recorded with table %016" PRIx64 ", diagnosed with table %016" PRIx64 " of the same module: set-points came from "
+                       "another model, and so may what the module is; --table takes another",
+                       run->table_hash, hash);
+    }
+    if (search->data->from_simulator) {
+        describe_baseline(diagnosis, search);
+        return;
+    }
     if (!run->has_duty) {
         diagnosis_warn(diagnosis, "no duties in the log: supply, valve and line effects cannot be told apart; record valve1..3");
     }

@@ -5,6 +5,8 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "gap/baseline.h"
+#include "gap/unit_check.h"
 #include "log/run_log.h"
 #include "safety/supervisor.h"
 
@@ -129,7 +131,10 @@ static bool take_log(struct gap_run *run, const struct run_log *log, char *error
     static const char *const tips[8] = {"tip_x_m", "tip_y_m", "tip_z_m", "tip_qw",
                                         "tip_qx",  "tip_qy",  "tip_qz",  "tip_status"};
     int tip_column[8];
+    const char *table_hash = run_log_metadata(log, "table");
     run->rows = log->rows;
+    run->header_line = log->header_line;
+    run->table_hash = table_hash != NULL ? strtoull(table_hash, NULL, 16) : 0;
     run->time_s = malloc(log->rows * sizeof(double));
     run->duty = malloc(3 * log->rows * sizeof(double));
     run->reading_pa = malloc(3 * log->rows * sizeof(double));
@@ -159,45 +164,7 @@ static bool take_log(struct gap_run *run, const struct run_log *log, char *error
     }
     count_repeats(run);
     find_cuts(run, log);
-    return true;
-}
-
-static double greatest_of(const double *value, size_t count) {
-    double most = 0.0;
-    for (size_t i = 0; i < count; i++) {
-        most = isnan(value[i]) ? most : fmax(most, fabs(value[i]));
-    }
-    return most;
-}
-
-/* Pressures of some pascals or positions of metres are somebody's bar, kPa or mm under our column's name. */
-static bool check_units(const struct gap_run *run, char *error, size_t error_bytes) {
-    const double reading_pa = greatest_of(run->reading_pa, 3 * run->rows);
-    const double least_pa = 500.0, most_pa = 2e6, most_m = 1.0;
-    double position_m = 0.0;
-    for (size_t i = 0; i < run->tips; i++) {
-        position_m = fmax(position_m, greatest_of(run->tip[i].position_m, 3));
-    }
-    if (run->has_reading && reading_pa > 0.0 && reading_pa < least_pa) {
-        (void)snprintf(error, error_bytes,
-                       "%s: the greatest of p1_pa to p3_pa is %.3g: that looks like %s, not Pa; multiply the columns by %.0f, or "
-                       "import the recording with a mapping that names its unit",
-                       run->path, reading_pa, reading_pa < 5.0 ? "bar" : "kPa", reading_pa < 5.0 ? 1e5 : 1e3);
-        return false;
-    }
-    if (reading_pa > most_pa) {
-        (void)snprintf(error, error_bytes, "%s: the greatest of p1_pa to p3_pa is %.3g Pa: is it absolute, or in another unit?",
-                       run->path, reading_pa);
-        return false;
-    }
-    if (position_m > most_m) {
-        (void)snprintf(error, error_bytes,
-                       "%s: the greatest of tip_x_m to tip_z_m is %.3g: that looks like mm, not m; divide the columns by 1000, or "
-                       "import the recording with a mapping that names its unit",
-                       run->path, position_m);
-        return false;
-    }
-    return true;
+    return gap_baseline_take(run, log, error, error_bytes);
 }
 
 bool gap_data_read(struct gap_data *data, const char *const *paths, size_t count, char *error, size_t error_bytes) {
@@ -219,7 +186,7 @@ bool gap_data_read(struct gap_data *data, const char *const *paths, size_t count
                                log.module, paths[0], data->module);
                 taken = false;
             }
-            taken = taken && take_log(run, &log, error, error_bytes) && check_units(run, error, error_bytes);
+            taken = taken && unit_check(paths[i], &log, error, error_bytes) && take_log(run, &log, error, error_bytes);
             run_log_free(&log);
         }
         if (!taken) {
@@ -242,6 +209,7 @@ double gap_data_repeated_share(const struct gap_data *data) {
 void gap_data_free(struct gap_data *data) {
     for (size_t i = 0; i < data->runs; i++) {
         struct gap_run *run = &data->run[i];
+        gap_baseline_free(run);
         free(run->time_s);
         free(run->duty);
         free(run->reading_pa);

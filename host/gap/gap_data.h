@@ -16,8 +16,18 @@ struct gap_tip {
     bool repeated;        /* the same words as the sample before */
 };
 
+/* The tip in the base frame; the quaternion NAN where only the position is known. */
+struct gap_pose {
+    double position_m[3];
+    double quaternion[4];
+};
+
+struct gap_simulator;
+
 struct gap_run {
     char path[GAP_PATH_BYTES];
+    size_t header_line;    /* in the file */
+    uint64_t table_hash;   /* of the table that the controller had; 0: the log does not say */
     size_t rows;
     double *time_s;
     double *duty;          /* [rows * 3]; holds from its row on */
@@ -26,7 +36,7 @@ struct gap_run {
     bool *cut;             /* [rows]; the controller de-energises all coils in this row, inside a period too */
     double *supply_pa;     /* [rows] */
     double *temperature_k; /* [rows] */
-    bool has_duty;
+    bool has_duty;         /* pressures can be simulated without the readings: from duties, or they are another simulator's */
     bool has_reading;
     bool has_command;
     bool has_supply;       /* measured: it is not one constant value */
@@ -37,16 +47,24 @@ struct gap_run {
     size_t tips_skipped;   /* with a status bit set, or a quaternion that is none */
     size_t tips_moving;    /* samples taken while the tip moved .. */
     size_t tips_repeated;  /* .. and which of them repeat the one before */
+    struct gap_simulator *simulator; /* another simulator's columns (gap/baseline.h); NULL: there are none */
+    /* Only while another simulator is the baseline: */
+    double *sim_pa;            /* [rows * 3] its chamber pressures, without holes; NULL: it gives none */
+    struct gap_pose *sim_tip;  /* [tips] its pose at each tip sample; NULL: it gives none */
+    size_t rows_without_sim;   /* rows with a measured pressure, and .. */
+    size_t tips_without_sim;   /* .. tip samples, where it says nothing: they are left out */
+    bool sim_is_copy;          /* its pressures are the measured ones again, and count as none */
+    bool sim_as_shown;         /* its poses are as old as the sensor's in the same row */
 };
 
 struct gap_data {
     size_t runs;
     struct gap_run run[GAP_RUNS_MAX];
     char module[256];
-    bool from_simulator; /* the baseline is another simulator's output, in sim_tip_* and sim_p* columns */
+    bool from_simulator; /* the baseline is another simulator's output: gap_baseline_use() */
 };
 
-/* Reads the logs. False: `error` names file, line, column and remedy. */
+/* Reads the logs; the baseline is our own replay. False: `error` names file, line, column and remedy. */
 bool gap_data_read(struct gap_data *data, const char *const *paths, size_t count, char *error, size_t error_bytes);
 /* Share of repeated samples among those taken while the tip moved, over all runs. */
 double gap_data_repeated_share(const struct gap_data *data);

@@ -4,6 +4,8 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "gap/replay_elsewhere.h"
+
 #define PRESSURE_BLOCK_US ((int64_t)(REPLAY_PRESSURE_BLOCK_S * 1e6 + 0.5))
 #define TIP_BLOCK_S REPLAY_TIP_BLOCK_S
 #define HELD_OUT_S 2.5          /* lengths of the blocks that are kept from the fit, every other one */
@@ -159,6 +161,7 @@ static bool find_noise(struct replay_run *run) {
         for (size_t k = 0; k < 3; k++) {
             for (size_t i = 0; i < data->tips; i++) {
                 values[i] = kind == 0 ? data->tip[i].position_m[k] : 2.0 * data->tip[i].quaternion[1 + k];
+                values[i] -= data->sim_tip == NULL ? 0.0 : replay_elsewhere_noise_part(data, i, kind, k);
             }
             sum += pow(noise_of(values, 1, data->tips, kind == 0 ? POSITION_LEAST_M : ANGLE_LEAST_RAD, room), 2.0) / 3.0;
         }
@@ -193,6 +196,7 @@ static bool open_with_step(struct replay *replay, const struct gap_data *data, c
     replay->table = table;
     replay->nominal = *nominal;
     replay->step_us = step_us;
+    replay->elsewhere.stiffness_scale = 1.0;
     for (size_t i = 0; i < data->runs; i++) {
         replay->run[i].run = &data->run[i];
         replay->runs++;
@@ -232,6 +236,7 @@ bool replay_open_coarse(struct replay *coarse, const struct replay *fine) {
 
 void replay_follow(struct replay *coarse, const struct replay *fine) {
     coarse->rigid = fine->rigid;
+    coarse->elsewhere = fine->elsewhere;
     memcpy(coarse->weight, fine->weight, fine->residuals * sizeof *fine->weight);
     for (size_t i = 0; i < fine->runs; i++) {
         memcpy(coarse->run[i].smoother, fine->run[i].smoother, sizeof fine->run[i].smoother);
@@ -499,7 +504,10 @@ void replay_pressures(const struct replay *replay, const struct gap_model *model
         if (walk.count == NULL) {
             continue; /* the run then counts as matched: no worse than the nominal one */
         }
-        if (run->run->has_duty) {
+        if (run->run->sim_pa != NULL) {
+            replay_elsewhere_pressures(replay, i, state->pressure_pa[i]);
+            show_run(replay, model, i, &plant, state->pressure_pa[i], &walk);
+        } else if (run->run->has_duty) {
             simulate_run(replay, model, i, &plant, &walk, state->pressure_pa[i]);
             finish_rows(&walk);
         } else {
@@ -593,7 +601,8 @@ static void tip_of_run(const struct replay *replay, const struct gap_model *mode
     struct plant plant;
     size_t block = 0, count = 0, row = 0;
     double sum[REPLAY_TIP_CHANNELS] = {0.0}, before_s = 1e-6 * (double)run->start_us;
-    const bool picked = replay->coarse && !replay_needs_samples(model);
+    const bool sampled = data->sim_tip != NULL && data->sim_pa == NULL; /* what the sensors show is told at each sample */
+    const bool picked = replay->coarse && !replay_needs_samples(model) && !sampled;
     set_up_plant(replay, model, &plant);
     for (size_t n = 0; n < (picked ? run->picks : data->tips); n++) {
         const size_t i = picked ? run->pick[n] : n;
@@ -610,7 +619,12 @@ static void tip_of_run(const struct replay *replay, const struct gap_model *mode
         }
         plant.temperature_k = temperature_at(data, row);
         pressures_at(replay, state, index, tip->time_s, from_duties, nudge_pa, nudged, pressure_pa);
-        plant_sample_tip(&plant, pressure_pa, tip->time_s, fmax(tip->time_s - before_s, 1e-6), tip->repeated ? 0.0 : 1.0);
+        const double step_s = fmax(tip->time_s - before_s, 1e-6), chance = tip->repeated ? 0.0 : 1.0;
+        if (data->sim_tip != NULL) {
+            replay_elsewhere_sample(replay, index, state, &plant, i, pressure_pa, step_s, chance);
+        } else {
+            plant_sample_tip(&plant, pressure_pa, tip->time_s, step_s, chance);
+        }
         before_s = tip->time_s;
         if (!isnan(tip->quaternion[0])) {
             rotation_between(tip->quaternion, plant.pose.quaternion, rotation);
@@ -764,6 +778,12 @@ bool replay_prepare(struct replay *replay, const struct gap_model *model, struct
         weigh_pressures(replay, i);
     }
     choose_duty_timing(replay, model, state);
+    if (replay->data->from_simulator) {
+        if (!replay_tune(replay, model, state)) {
+            return false;
+        }
+        replay_elsewhere_match(replay, state);
+    }
     return replay_tune(replay, model, state);
 }
 

@@ -43,6 +43,13 @@ struct replay_run {
     uint32_t *pick;         /* [picks] the tip sample in the middle of each block that has any */
 };
 
+/* Another simulator as the baseline (gap/replay_elsewhere.h): how our table model compares. */
+struct replay_elsewhere {
+    double stiffness_scale; /* with which it moves most like the other simulator; 1 while that is not known */
+    double apart_m;         /* rms, about the mean, that is then left between the two tips .. */
+    double moves_m;         /* .. while the other's moves by so much about its mean */
+};
+
 struct replay {
     const struct gap_data *data;
     const struct bend_table *table;
@@ -55,6 +62,7 @@ struct replay {
     bool rigid;        /* pressures are as the duties make them, but for a constant: the tip then tells of them finest */
     double *weight;    /* [residuals] 1 / (noise of a block) */
     uint8_t *held_out; /* [residuals] 1: not used to fit */
+    struct replay_elsewhere elsewhere;
 };
 
 /* What a replay of one model leaves behind; one for each thread. */

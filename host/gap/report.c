@@ -4,6 +4,7 @@
 #include <math.h>
 #include <string.h>
 
+#include "gap/baseline.h"
 #include "program/output_file.h"
 
 /* --- text --- */
@@ -98,8 +99,10 @@ void gap_report_text(const struct diagnosis *diagnosis, const struct gap_data *d
     if (diagnosis->verdict != GAP_INSUFFICIENT_DATA) {
         fprintf(out, "nominal   stiffness x ");
         print_value(out, &diagnosis->stiffness_scale, "1");
-        fprintf(out, ", supply x ");
-        print_value(out, &diagnosis->supply_scale, "1");
+        if (!data->from_simulator) {
+            fprintf(out, ", supply x ");
+            print_value(out, &diagnosis->supply_scale, "1");
+        }
         fprintf(out, "\nhow far   %.0f %% of the gap closed (%.0f to %.0f %%); by recalibration alone %.0f %%\n",
                 100.0 * diagnosis->closed.value, 100.0 * diagnosis->closed.low, 100.0 * diagnosis->closed.high,
                 100.0 * diagnosis->closed_recalibration.value);
@@ -118,7 +121,6 @@ void gap_report_text(const struct diagnosis *diagnosis, const struct gap_data *d
     for (size_t i = 0; i < diagnosis->warnings; i++) {
         fprintf(out, "note      %s\n", diagnosis->warning[i]);
     }
-    (void)data;
 }
 
 /* --- JSON --- */
@@ -202,6 +204,19 @@ static json_t *dependences_json(const struct dependences *dependences) {
     return list;
 }
 
+/* What cannot act on the baseline, and why. */
+static json_t *untried_json(const struct gap_data *data) {
+    json_t *list = json_array();
+    for (size_t i = 0; i < effect_kind_count() && data->from_simulator; i++) {
+        const struct effect_kind *kind = effect_kind_at(i);
+        const char *reason = gap_baseline_why_not(data, kind);
+        if (reason != NULL) {
+            json_array_append_new(list, json_pack("{s:s,s:s}", "name", kind->name, "reason", reason));
+        }
+    }
+    return list;
+}
+
 static json_t *report_json(const struct diagnosis *diagnosis, const struct gap_data *data) {
     json_t *chambers = json_array(), *group = json_array(), *warnings = json_array(), *logs = json_array();
     for (size_t c = 0; c < 3; c++) {
@@ -239,6 +254,8 @@ bool gap_report_json(const struct diagnosis *diagnosis, const struct gap_data *d
         (void)snprintf(error, error_bytes, "%s: the report could not be put together", path);
         return false;
     }
+    json_object_set_new(report, "baseline", json_string(data->from_simulator ? "simulator" : "table"));
+    json_object_set_new(report, "not_tried", untried_json(data));
     if (!output_file_open(&file, path, error, error_bytes)) {
         json_decref(report);
         return false;

@@ -4,6 +4,8 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "gap/baseline.h"
+
 /* --- tried --- */
 
 static double held_out(const struct fit *fit) {
@@ -135,6 +137,9 @@ const char *report_why_untried(const struct search *search, const struct effect_
     }
     if (was_tried(search, kind)) {
         return NULL;
+    }
+    if (search->data->from_simulator && gap_baseline_why_not(search->data, kind) != NULL) {
+        return gap_baseline_why_not(search->data, kind);
     }
     if (kind->by_chance) {
         return has.repeats ? NULL : "hardly any tip sample is repeated while the tip moves";

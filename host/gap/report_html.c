@@ -245,7 +245,9 @@ static void write_columns(FILE *out, const struct gap_run *run) {
     const struct {
         bool present;
         const char *name;
-    } columns[] = {{run->has_duty, "duties"},
+    } columns[] = {{run->has_duty && run->sim_pa == NULL, "duties"},
+                   {run->sim_pa != NULL, "pressures of another simulator"},
+                   {run->sim_tip != NULL, "its tip"},
                    {run->has_reading, "pressures"},
                    {run->has_supply, "supply"},
                    {run->tips > 0, "tip position"},
@@ -315,9 +317,12 @@ static bool write_series(FILE *out, const struct diagnosis *diagnosis, const str
     if (!report_series_open(&series, search)) {
         return false;
     }
-    fputs("<section id=\"runs\"><h2>Measured and simulated</h2>\n<p class=\"muted\">The tip is simulated "
-          "from the measured "
-          "pressures, so that little of what supply and valves do wrong reaches it.</p>\n",
+    fputs("<section id=\"runs\"><h2>Measured and simulated</h2>\n<p class=\"muted\">", out);
+    fputs(search->data->from_simulator
+              ? "Simulated is what another simulator wrote into the log, moved by what the difference between its pressures "
+                "and the measured ones changes in the table model.</p>\n"
+              : "The tip is simulated from the measured pressures, so that little of what supply and valves do wrong reaches "
+                "it.</p>\n",
           out);
     report_runs(out, &series, search->data);
     fputs("</section>\n<section id=\"residuals\"><h2>What is left, against what it might depend on</h2>\n",

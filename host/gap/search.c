@@ -5,6 +5,8 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "gap/baseline.h"
+
 #define STARTS_MAX 4
 #define STARTS_CHEAP 8        /* where no gas need be replayed */
 #define SMALL_SHARE 0.25      /* of the typical size */
@@ -67,6 +69,9 @@ static bool can_show(const struct gap_data *data, const struct effect_kind *kind
     const bool duties = has_everywhere(data, offsetof(struct gap_run, has_duty));
     const bool readings = has_everywhere(data, offsetof(struct gap_run, has_reading));
     const bool tips = data->run[0].tips > 0;
+    if (data->from_simulator && gap_baseline_why_not(data, kind) != NULL) {
+        return false;
+    }
     if (kind->by_chance) {
         return gap_data_repeated_share(data) > REPEATS_LEAST;
     }

@@ -197,12 +197,17 @@ static bool read_metadata(struct reader *reader, struct run_log *log) {
 }
 
 static bool read_preamble(struct reader *reader, struct run_log *log) {
-    if (!next_line(reader) || strcmp(reader->line, FIRST_LINE) != 0) {
+    if (!next_line(reader)) {
+        reader->line_number = 1;
+        return fail(reader, "the file is empty: a run log starts with '" FIRST_LINE "', metadata, a header and rows");
+    }
+    if (strcmp(reader->line, FIRST_LINE) != 0) {
         return fail(reader, "this is no run log: the first line is not '" FIRST_LINE
                             "'; for the logs of other programs see tribend import");
     }
     while (next_line(reader)) {
         if (reader->line[0] != '#') {
+            log->header_line = (size_t)reader->line_number;
             return read_header(reader, log);
         }
         if (!read_metadata(reader, log)) {

@@ -59,6 +59,7 @@ struct run_log {
     char name[RUN_LOG_COLUMNS_MAX][RUN_LOG_NAME_BYTES];
     double *value; /* [row * columns + column]; NaN where empty; states as enum supervisor_state */
     char module[RUN_LOG_KEY_BYTES];
+    size_t header_line; /* in its file, from 1; row r stands in line header_line + 1 + r. 0: not from a file */
     size_t metadata_count;
     struct run_log_entry metadata[RUN_LOG_METADATA_MAX]; /* in the file's order, `module` among them */
 };

@@ -5,6 +5,7 @@
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
+#include <yaml.h>
 
 #define LINE_BYTES 1024
 
@@ -53,6 +54,106 @@ static int line_of(const struct capture *capture, const char *path) {
     return line > 0 ? line : capture->line;
 }
 
+/* --- numbers: libcyaml takes the digits that a scalar starts with and lets pass what follows --- */
+
+struct numbers {
+    const char *path;
+    yaml_document_t document;
+    struct description_error *error;
+};
+
+static bool is_number(enum cyaml_type type, const char *text) {
+    char *end = NULL;
+    errno = 0;
+    if (type == CYAML_FLOAT) {
+        (void)strtod(text, &end); /* an overflow gives infinity, which the checks of each file refuse */
+        return end != text && *end == '\0';
+    }
+    if (type == CYAML_INT) {
+        (void)strtoll(text, &end, 0);
+    } else {
+        (void)strtoull(text, &end, 0);
+    }
+    return end != text && *end == '\0' && errno == 0;
+}
+
+static bool check_scalar(const struct numbers *numbers, const yaml_node_t *node, enum cyaml_type type, const char *key) {
+    const char *text = (const char *)node->data.scalar.value;
+    if (is_number(type, text)) {
+        return true;
+    }
+    (void)snprintf(numbers->error->text, sizeof numbers->error->text,
+                   "%s:%zu: %s: '%.40s' is not a %snumber; write it alone, in SI units and without a unit", numbers->path,
+                   node->start_mark.line + 1, key, text, type == CYAML_FLOAT ? "" : "whole ");
+    return false;
+}
+
+static const cyaml_schema_field_t *find_field(const cyaml_schema_field_t *field, const char *key) {
+    while (field->key != NULL && strcmp(field->key, key) != 0) {
+        field++;
+    }
+    return field->key == NULL ? NULL : field;
+}
+
+/* Every scalar that the schema takes for a number; `key` is the innermost one above it. Goes as deep as the schema, which
+ * does not contain itself. */
+static bool check_node(struct numbers *numbers, const yaml_node_t *node, const cyaml_schema_value_t *schema, // NOLINT(misc-no-recursion)
+                       const char *key) {
+    const bool is_sequence = schema->type == CYAML_SEQUENCE || schema->type == CYAML_SEQUENCE_FIXED;
+    bool sound = true;
+    if (node == NULL) {
+        return true;
+    }
+    if (node->type == YAML_SCALAR_NODE &&
+        (schema->type == CYAML_FLOAT || schema->type == CYAML_INT || schema->type == CYAML_UINT)) {
+        return check_scalar(numbers, node, schema->type, key);
+    }
+    if (node->type == YAML_SEQUENCE_NODE && is_sequence) {
+        for (const yaml_node_item_t *item = node->data.sequence.items.start; item < node->data.sequence.items.top && sound;
+             item++) {
+            sound = check_node(numbers, yaml_document_get_node(&numbers->document, *item), schema->sequence.entry, key);
+        }
+    }
+    if (node->type == YAML_MAPPING_NODE && schema->type == CYAML_MAPPING) {
+        for (const yaml_node_pair_t *pair = node->data.mapping.pairs.start; pair < node->data.mapping.pairs.top && sound;
+             pair++) {
+            const yaml_node_t *name = yaml_document_get_node(&numbers->document, pair->key);
+            const bool named = name != NULL && name->type == YAML_SCALAR_NODE;
+            const char *text = named ? (const char *)name->data.scalar.value : "";
+            const cyaml_schema_field_t *field = find_field(schema->mapping.fields, text);
+            sound = field == NULL ||
+                    check_node(numbers, yaml_document_get_node(&numbers->document, pair->value), &field->value, text);
+        }
+    }
+    return sound;
+}
+
+/* Of a file that libcyaml has taken. */
+static bool check_numbers(const char *path, const cyaml_schema_value_t *schema, struct description_error *error) {
+    struct numbers numbers = {.path = path, .error = error};
+    yaml_parser_t parser;
+    FILE *file = fopen(path, "r");
+    if (file == NULL || yaml_parser_initialize(&parser) == 0) {
+        (void)snprintf(error->text, sizeof error->text, "%s: %s", path, file == NULL ? strerror(errno) : "out of memory");
+        if (file != NULL) {
+            (void)fclose(file);
+        }
+        return false;
+    }
+    yaml_parser_set_input_file(&parser, file);
+    bool sound = yaml_parser_load(&parser, &numbers.document) != 0;
+    if (sound) {
+        sound = check_node(&numbers, yaml_document_get_root_node(&numbers.document), schema, "the file");
+        yaml_document_delete(&numbers.document);
+    } else {
+        (void)snprintf(error->text, sizeof error->text, "%s:%zu: %s", path, parser.problem_mark.line + 1,
+                       parser.problem != NULL ? parser.problem : "out of memory");
+    }
+    yaml_parser_delete(&parser);
+    (void)fclose(file);
+    return sound;
+}
+
 bool yaml_file_load(const char *path, const cyaml_schema_value_t *schema, void **data, struct description_error *error) {
     struct capture capture = {.what = "", .where = "", .line = 0};
     cyaml_config_t config = yaml_config;
@@ -66,8 +167,13 @@ bool yaml_file_load(const char *path, const cyaml_schema_value_t *schema, void *
     }
     (void)fclose(probe);
     const cyaml_err_t result = cyaml_load_file(path, &config, schema, (cyaml_data_t **)data, NULL);
-    if (result == CYAML_OK) {
+    if (result == CYAML_OK && check_numbers(path, schema, error)) {
         return true;
+    }
+    if (result == CYAML_OK) {
+        (void)cyaml_free(&yaml_config, schema, *data, 0);
+        *data = NULL;
+        return false;
     }
     (void)snprintf(error->text, sizeof error->text, "%s:%d: %s%s%s (%s); see tables/README.md for the keys", path,
                    line_of(&capture, path), capture.what[0] == '\0' ? cyaml_strerror(result) : capture.what,

@@ -8,7 +8,7 @@
 
 extern const cyaml_config_t yaml_config;
 
-/* False: `error` is filled. The caller frees `*data` with cyaml_free(&yaml_config, schema, *data, 0). */
+/* A number followed by anything else, such as its unit, is refused. False: `error` is filled. The caller frees `*data` with cyaml_free(&yaml_config, schema, *data, 0). */
 bool yaml_file_load(const char *path, const cyaml_schema_value_t *schema, void **data, struct description_error *error);
 /* Line of the `occurrence`-th line (from 1) whose first word is `key:`, 0 when there is none. */
 int yaml_file_line(const char *path, const char *key, int occurrence);

@@ -43,6 +43,8 @@ expect radius_negative 3 'radius_m.*-0.0037' build_table "$(module negative 's/r
 expect chambers_overlap 3 'overlap' build_table "$(module overlap 's/radius_m: .*/radius_m: 0.0070/; s/0\.0073/0.0053/; s/semicircle/circle/')"
 expect chamber_leaves_module 3 'leaves|outside' build_table "$(module leaves 's/0\.0073/0.0103/')"
 expect shape_unknown 3 'shape|triangle' build_table "$(module shape 's/shape: semicircle/shape: triangle/')"
+expect number_with_words_behind 3 "trailing.yaml:[0-9]+: length_m: '0.06banana' is not a number" build_table "$(module trailing 's/^length_m: .*/length_m: 0.06banana/')"
+expect number_with_unit 3 "unitful.yaml:[0-9]+: radius_m: '3.7mm' is not a number" build_table "$(module unitful 's/radius_m: .*/radius_m: 3.7mm/')"
 expect number_malformed 3 'length_m' build_table "$(module number 's/^length_m: .*/length_m: long/')"
 expect caps_longer_than_module 3 'cap|length' build_table "$(module caps 's/proximal_m: .*/proximal_m: 0.070/')"
 expect sector_without_opening 3 'opening_deg' build_table "$(module opening 's/shape: semicircle/shape: sector/')"
@@ -66,6 +68,10 @@ sed '/^exponents/d' tables/materials/ecoflex-0030-measured-ogden.yaml >"$scratch
 expect ogden_without_exponents 3 'one exponent for each' "$tables" material "$scratch/materials/no-exponents.yaml"
 sed 's/^law: .*/law: yeoh\nexponents: [1, 2, 3]/' tables/materials/ecoflex-0030-positive.yaml >"$scratch/materials/exponents.yaml"
 expect exponents_of_no_use 3 'only ogden' "$tables" material "$scratch/materials/exponents.yaml"
+sed 's/^density_kgpm3: .*/density_kgpm3: 1070kg/' tables/materials/ecoflex-0030-positive.yaml >"$scratch/materials/heavy.yaml"
+expect material_number_with_unit 3 "heavy.yaml:[0-9]+: density_kgpm3: '1070kg' is not a number" "$tables" material "$scratch/materials/heavy.yaml"
+sed 's/^coefficients_pa: *.[0-9]*/coefficients_pa: [1e4Pa/' tables/materials/ecoflex-0030-positive.yaml >"$scratch/materials/list.yaml"
+expect material_number_in_a_list_with_unit 3 "list.yaml:[0-9]+: coefficients_pa: '1e4Pa' is not a number" "$tables" material "$scratch/materials/list.yaml"
 expect material_name_unknown 3 'unobtainium' "$tables" material unobtainium
 expect output_folder_missing 5 '/nowhere' "$tables" solve paper-semicircle --to 2deg --csv /nowhere/path.csv
 
@@ -153,12 +159,44 @@ log() { # NAME AWK_STATEMENT: the good log with its rows changed
     echo "$scratch/$1.csv"
 }
 expect log_in_bar 3 'looks like bar' "$tribend" gap diagnose -q "$(log bar 'for (i = 8; i <= 10; i++) $i = $i / 1e5')"
+scale() { log "$1" "for (i = $2; i <= $3; i++) if (\$i != \"\") \$i = \$i * $4"; } # NAME FIRST_COLUMN LAST FACTOR
+blank() { log "$1" "for (i = $2; i <= $3; i++) \$i = \"\"; for (i = $4; i <= $5; i++) \$i = \$i * $6"; }
+expect log_in_kilopascal 3 'kpa.csv:[0-9]+: column p[123]_pa: .*looks like kPa, not Pa; multiply the columns by 1000' "$tribend" gap diagnose -q "$(scale kpa 8 10 1e-3)"
+expect log_in_millibar 3 'looks like mbar' "$tribend" gap diagnose -q "$(scale mbar 8 10 1e-2)"
+expect log_in_psi 3 'looks like psi' "$tribend" gap diagnose -q "$(scale psi 8 10 1.450377e-4)"
+expect log_in_kilopascal_without_set_points 3 'looks like kPa .*psi .*mbar' "$tribend" gap diagnose -q "$(blank lonely 5 7 8 10 1e-3)"
+expect log_with_set_points_in_kilopascal 3 'column p[123]_cmd_pa: .*looks like kPa' "$tribend" gap diagnose -q "$(scale cmdkpa 5 7 1e-3)"
+expect log_with_supply_in_kilopascal 3 'column supply_pa: 40 .*looks like kPa' "$tribend" gap diagnose -q "$(scale supply 11 11 1e-3)"
+expect log_in_pascal_times_1000 3 'p[123]_pa: .* beyond any soft module' "$tribend" gap diagnose -q "$(scale large 8 10 1000)"
+expect log_absolute 3 'look absolute; subtract' "$tribend" gap diagnose -q "$(log absolute 'for (i = 8; i <= 10; i++) $i = $i + 101325')"
+expect log_duty_in_percent 3 'percent.csv:[0-9]+: column valve[123]: .*looks like percent; divide' "$tribend" gap diagnose -q "$(scale percent 2 4 100)"
+expect log_duty_in_counts 3 'column valve[123]: .*no duty' "$tribend" gap diagnose -q "$(scale counts 2 4 4095)"
+expect log_time_in_milliseconds 3 'ms.csv:[0-9]+: column time_s: rows are .* looks like ms; divide' "$tribend" gap diagnose -q "$(scale ms 1 1 1000)"
+expect log_time_in_microseconds 3 'looks like us; divide' "$tribend" gap diagnose -q "$(scale us 1 1 1e6)"
+expect log_tip_in_micrometres 3 'looks like um' "$tribend" gap diagnose -q "$(scale um 12 14 1e6)"
+expect log_turned_in_degrees 3 'degrees.csv:[0-9]+: column tip_qw: .*angles in degrees' "$tribend" gap diagnose -q "$(scale degrees 15 18 57.2958)"
+expect log_bend_in_degrees 3 'column bend_cmd_rad: .*looks like degrees' "$tribend" gap diagnose -q "$(scale bend 22 22 57.2958)"
+expect log_empty 3 'nothing.csv.*empty' "$tribend" gap diagnose -q "$(: >"$scratch/nothing.csv"; echo "$scratch/nothing.csv")"
+expect log_header_only 3 'header.csv.*no rows' "$tribend" gap diagnose -q "$(grep -E '^#|^time' "$scratch/good.csv" >"$scratch/header.csv"; echo "$scratch/header.csv")"
 expect log_in_millimetres 3 'looks like mm' "$tribend" gap diagnose -q "$(log mm 'for (i = 12; i <= 14; i++) if ($i != "") $i = $i * 1000')"
-expect log_with_nan 3 'nan.csv:[0-9]+: .*p2_pa' "$tribend" gap diagnose -q "$(log nan 'if (n == 50) $9 = "nan"')"
+expect log_with_nan 3 'nan.csv:56: column p2_pa: .*leave the field empty' "$tribend" gap diagnose -q "$(log nan 'if (n == 50) $9 = "nan"')"
 expect log_backwards 3 'backwards.csv:[0-9]+: .*time_s' "$tribend" gap diagnose -q "$(log backwards 'if (n == 50) $1 = 0')"
 expect log_of_one_row 3 'one.csv' "$tribend" gap diagnose -q "$(log one 'if (n > 1) exit')"
 expect log_of_another_module 3 'is of module other' "$tribend" gap diagnose -q "$(sed 's/^# module: .*/# module: other/' "$scratch/good.csv" >"$scratch/other.csv"; echo "$scratch/other.csv")"
 expect effect_left_out_is_none 2 'no effect' "$tribend" gap diagnose -q --without nothing "$scratch/good.csv"
+
+echo "[ RUN      ] log_without_movement_is_insufficient"
+log still 'for (i = 5; i <= 10; i++) $i = 3000 + (n * 37) % 11; $2 = $3 = $4 = 0.3' >/dev/null
+if "$tribend" gap diagnose "$scratch/still.csv" >"$scratch/stdout" 2>&1 && grep -q '^verdict *insufficient-data' "$scratch/stdout" &&
+    grep -q 'pressures never move' "$scratch/stdout"; then
+    echo "[       OK ] log_without_movement_is_insufficient"
+    passed=$((passed + 1))
+else
+    cat "$scratch/stdout"
+    echo "[  FAILED  ] log_without_movement_is_insufficient"
+    failed=$((failed + 1))
+fi
+expect log_of_exchanged_chambers 3 'exchanged.csv:[0-9]+: the log.s chambers look exchanged: p1 and p2 .*swap columns p1_pa and p2_pa and repeat' "$tribend" gap diagnose -q "$(log exchanged 't = $8; $8 = $9; $9 = t')"
 
 # --- calibrations: test_calibration.c has the messages; here, that each program gives them
 cat >"$scratch/soft.yaml" <<'YAML'
