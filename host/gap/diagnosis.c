@@ -518,9 +518,12 @@ static bool one_chamber_moves(const struct gap_data *data) {
 
 /* On one chamber a narrow line does just what a sluggish valve does. Where the others flow freely the valve is the likelier; where
  * no other flows, neither is. */
-static void share_with_twin(struct diagnosis *diagnosis, struct diagnosis_effect *effect, const struct gap_data *data) {
+static void share_with_twin(struct diagnosis *diagnosis, struct diagnosis_effect *effect, const struct search *search) {
     const bool valve = strcmp(effect->kind->name, "valve_sluggish") == 0;
-    const bool line = strcmp(effect->kind->name, "line_resistance") == 0, alone = one_chamber_moves(data);
+    const bool line = strcmp(effect->kind->name, "line_resistance") == 0, alone = one_chamber_moves(search->data);
+    if (search_leaves_out(search, valve ? "line_resistance" : "valve_sluggish")) {
+        return;
+    }
     if (!valve && !(line && (alone || effect->chamber > 0))) {
         return;
     }
@@ -531,7 +534,7 @@ static void share_with_twin(struct diagnosis *diagnosis, struct diagnosis_effect
 }
 
 static void believe_effect(struct diagnosis *diagnosis, struct diagnosis_effect *effect, const struct rivals *rivals,
-                           const struct gap_data *data) {
+                           const struct search *search) {
     effect->probability = 0.0;
     for (size_t i = 0; i < rivals->count; i++) {
         if (rivals->rival[i].kind == effect->kind) {
@@ -541,7 +544,7 @@ static void believe_effect(struct diagnosis *diagnosis, struct diagnosis_effect 
     if (effect->probability < SURE) {
         name_group(diagnosis, rivals);
     }
-    share_with_twin(diagnosis, effect, data);
+    share_with_twin(diagnosis, effect, search);
     list_rivals(diagnosis, rivals);
 }
 
@@ -552,7 +555,7 @@ static void believe(struct diagnosis *diagnosis, const struct search *search) {
     for (size_t e = 0; e < diagnosis->effects; e++) {
         for (size_t r = 0; r < search->rivals_count; r++) {
             if (search->rivals[r].place == diagnosis->effect[e].place) {
-                believe_effect(diagnosis, &diagnosis->effect[e], &search->rivals[r], search->data);
+                believe_effect(diagnosis, &diagnosis->effect[e], &search->rivals[r], search);
             }
         }
     }

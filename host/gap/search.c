@@ -789,6 +789,10 @@ bool search_run(struct search *search, const struct gap_data *data, const struct
     return sound;
 }
 
+bool search_leaves_out(const struct search *search, const char *name) {
+    return is_without(&search->options, name);
+}
+
 void search_close(struct search *search) {
     replay_close(&search->replay);
     replay_close(&search->coarse);

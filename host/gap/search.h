@@ -47,6 +47,8 @@ struct search {
 /* False: out of memory, or interrupted before anything was known. */
 bool search_run(struct search *search, const struct gap_data *data, const struct bend_table *table,
                 const struct plant_parameters *nominal, const struct search_options *options);
+/* Was the name not to be tried? */
+bool search_leaves_out(const struct search *search, const char *name);
 void search_close(struct search *search);
 
 #endif
