@@ -681,7 +681,7 @@ static bool fit_smoothers(struct replay *replay, struct replay_state *state) {
 /* Block means of the readings themselves, for a run without duties. */
 static void readings_as_differences(const struct replay *replay, struct replay_state *state, size_t index) {
     const struct replay_run *run = &replay->run[index];
-    double *count = calloc(3 * run->blocks, sizeof *count);
+    double *count = calloc(3 * run->blocks + 1, sizeof *count);
     memset(state->difference[index], 0, 3 * run->blocks * sizeof(double));
     for (size_t row = 0; row < run->run->rows && count != NULL; row++) {
         for (size_t c = 0; c < 3; c++) {
