@@ -8,6 +8,7 @@
 #include "gap/baseline.h"
 
 #define STARTS_MAX 4
+#define THRESHOLD_STARTS 6
 #define STARTS_CHEAP 8        /* where no gas need be replayed */
 #define SMALL_SHARE 0.25      /* of the typical size */
 #define SCREEN_ROUNDS 1
@@ -148,6 +149,11 @@ static size_t place_start(const struct effect_kind *kind, size_t k, struct effec
     if (k == 1 && !sign && !secondary) { /* a small one: some are felt only in proportion near none */
         effect->parameter[0] = kind->parameter[0].none + SMALL_SHARE * (kind->parameter[0].typical - kind->parameter[0].none);
     }
+    if (kind->by_threshold) {
+        static const double share[THRESHOLD_STARTS] = {1.0, 0.6, 0.7, 0.8, 0.9, 1.2};
+        effect->parameter[0] = kind->parameter[0].none + share[k] * (kind->parameter[0].typical - kind->parameter[0].none);
+        return THRESHOLD_STARTS;
+    }
     return !secondary ? 2 : needs_gas(kind) ? STARTS_MAX : STARTS_CHEAP;
 }
 
@@ -275,7 +281,7 @@ static void shortlist(struct search *search, struct crew *crew, const struct can
             continue;
         }
         size_t starts = 1;
-        for (size_t k = 0; k < starts && k < 2; k++) {
+        for (size_t k = 0; k < starts && (k < 2 || kind->by_threshold); k++) {
             struct effect effect;
             double mine[4];
             effect_init(&effect, kind);

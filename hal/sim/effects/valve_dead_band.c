@@ -36,6 +36,7 @@ static const struct effect_kind valve_dead_band = {
                  "seen",
     .stage = EFFECT_STAGE_VALVE,
     .scope = EFFECT_EVERY_CHAMBER,
+    .by_threshold = true,
     .parameter_count = 2,
     .parameter =
         {[LEAST_DUTY] = {"least_duty", "1", 0.0, 0.5, 0.25, 0.0}, [LOSS] = {"loss", "1", 0.0, 1.0, 0.0, NAN}},
