@@ -25,6 +25,8 @@
 #define FLOOR_DOUBTFUL 10.0    /* neighbours differ by that many times the sensor's noise */
 #define CHUNK_S 2.5      /* of the bootstrap */
 #define RESAMPLES 400
+#define SEED 0x9e3779b97f4a7c15u
+#define KINDS 3          /* of residuals: pressure, position, angle */
 
 const char *gap_verdict_name(enum gap_verdict verdict) {
     static const char *const names[GAP_VERDICT_COUNT] = {"no-gap", "recalibrate", "effect",           "effects",
@@ -49,6 +51,7 @@ struct chunks {
     double *square;   /* sum of squares */
     double *noise;    /* sum of squares of half differences of neighbours: noise alone */
     double *residual; /* how many */
+    double *apart;    /* how many of them have a neighbour whose difference is no noise */
 };
 
 struct model_view {
@@ -62,8 +65,9 @@ static bool view_open(struct model_view *view, size_t residuals, size_t chunks) 
     view->chunks.square = calloc(chunks + 1, sizeof(double));
     view->chunks.noise = calloc(chunks + 1, sizeof(double));
     view->chunks.residual = calloc(chunks + 1, sizeof(double));
+    view->chunks.apart = calloc(chunks + 1, sizeof(double));
     return view->residual != NULL && view->chunks.square != NULL && view->chunks.noise != NULL &&
-           view->chunks.residual != NULL;
+           view->chunks.residual != NULL && view->chunks.apart != NULL;
 }
 
 static void view_close(struct model_view *view) {
@@ -71,6 +75,7 @@ static void view_close(struct model_view *view) {
     free(view->chunks.square);
     free(view->chunks.noise);
     free(view->chunks.residual);
+    free(view->chunks.apart);
 }
 
 struct series {
@@ -110,7 +115,9 @@ static void count_series(const struct replay *replay, const struct series *serie
         const double now = view->residual[at];
         view->chunks.square[chunk] += now * now;
         view->chunks.residual[chunk] += 1.0;
-        const bool follows = b > 0 && replay->held_out[at - series->stride] && replay->weight[at - series->stride] > 0.0;
+        const bool follows = b > 0 && !replay->apart[at] && replay->held_out[at - series->stride] &&
+                             replay->weight[at - series->stride] > 0.0;
+        view->chunks.apart[chunk] += replay->apart[at];
         const double step = follows ? now - view->residual[at - series->stride] : now;
         view->chunks.noise[chunk] += follows ? 0.5 * step * step : 0.0;
     }
@@ -142,6 +149,16 @@ static double mean_square(const struct chunks *chunks, const double *sum, const 
     return count > 0.0 ? total / count : 0.0;
 }
 
+/* What noise alone makes of a mean square. */
+static double noise_square(const struct chunks *chunks) {
+    double total = 0.0, count = 0.0;
+    for (size_t i = 0; i < chunks->count; i++) {
+        total += chunks->noise[i];
+        count += chunks->residual[i] - chunks->apart[i];
+    }
+    return count > 0.0 ? total / count : 0.0;
+}
+
 static double share_closed(const struct chunks *before, const struct chunks *after, double floor2, const size_t *pick) {
     const double gap = mean_square(before, before->square, pick) - floor2;
     return gap > 0.0 ? 1.0 - (mean_square(after, after->square, pick) - floor2) / gap : 0.0;
@@ -152,16 +169,20 @@ static int compare(const void *a, const void *b) {
     return (x > y) - (x < y);
 }
 
+static size_t draw(uint64_t *state, size_t count) {
+    *state = *state * 6364136223846793005u + 1442695040888963407u;
+    return (size_t)((*state >> 33) % count);
+}
+
 /* Interval by resampling chunks of time (Efron and Tibshirani 1993), seeded: the same answer every time. */
 static struct diagnosis_interval bootstrap(const struct chunks *before, const struct chunks *after, double floor2) {
     double value[RESAMPLES];
     size_t *pick = calloc(before->count + 1, sizeof *pick);
-    uint64_t state = 0x9e3779b97f4a7c15u;
+    uint64_t state = SEED;
     struct diagnosis_interval interval = {share_closed(before, after, floor2, NULL), 0.0, 0.0};
     for (size_t k = 0; k < RESAMPLES && pick != NULL; k++) {
         for (size_t i = 0; i < before->count; i++) {
-            state = state * 6364136223846793005u + 1442695040888963407u;
-            pick[i] = (size_t)((state >> 33) % before->count);
+            pick[i] = draw(&state, before->count);
         }
         value[k] = share_closed(before, after, floor2, pick);
     }
@@ -174,30 +195,87 @@ static struct diagnosis_interval bootstrap(const struct chunks *before, const st
     return interval;
 }
 
-/* Root mean square of held-out blocks in physical units: r1 in kPa, positions in mm, angles in degrees. */
-static void physical_rms(const struct replay *replay, const double *residual, double rms[3]) {
-    double sum[3] = {0.0, 0.0, 0.0}, count[3] = {0.0, 0.0, 0.0};
-    static const double unit[3] = {1e-3, 1e3, DEGREES};
+/* Sums of squares in physical units, and counts, of the held-out blocks of one chunk of time. */
+struct physical {
+    double square[KINDS];
+    double count[KINDS];
+};
+
+/* r1 in kPa, positions in mm, angles in degrees; `sum` by chunk. */
+static void sum_physical(const struct replay *replay, const double *residual, struct physical *sum) {
+    static const double unit[KINDS] = {1e-3, 1e3, DEGREES};
+    size_t first_chunk = 0;
     for (size_t i = 0; i < replay->runs; i++) {
-        const struct replay_run *run = &replay->run[i];
-        const size_t end = run->tip_at + REPLAY_TIP_CHANNELS * run->tip_blocks;
-        for (size_t k = run->pressure_at; k < end; k++) {
-            const bool supply = k >= run->supply_at && k < run->tip_at;
-            const size_t kind = k < run->supply_at ? 0 : (k - run->tip_at) % REPLAY_TIP_CHANNELS < 3 ? 1 : 2;
-            if (!supply && replay->held_out[k] && replay->weight[k] > 0.0) {
-                const double value = residual[k] / replay->weight[k] * unit[kind];
-                sum[kind] += value * value;
-                count[kind] += 1.0;
+        struct series series[10];
+        const size_t all = list_series(replay, i, first_chunk, series);
+        for (size_t s = 0; s < all; s++) {
+            const size_t kind = s < 3 ? 0 : s < 7 ? 1 : 2;
+            for (size_t b = 0; b < series[s].count && s != 3; b++) {
+                const size_t at = series[s].start + b * series[s].stride;
+                const size_t chunk = first_chunk + (size_t)((double)b * series[s].block_s / CHUNK_S);
+                if (replay->held_out[at] && replay->weight[at] > 0.0) {
+                    const double value = residual[at] / replay->weight[at] * unit[kind];
+                    sum[chunk].square[kind] += value * value;
+                    sum[chunk].count[kind] += 1.0;
+                }
             }
         }
+        first_chunk += chunks_of(&replay->run[i]);
     }
-    for (size_t kind = 0; kind < 3; kind++) {
-        rms[kind] = count[kind] > 0.0 ? sqrt(sum[kind] / count[kind]) : NAN;
+}
+
+/* Root mean square of one kind, with an interval from resampling the chunks that have any of it. `chosen` is room for one
+ * index a chunk. */
+static struct diagnosis_interval rms_of(const struct physical *sum, size_t chunks, size_t kind, size_t *chosen) {
+    double square = 0.0, count = 0.0, value[RESAMPLES];
+    uint64_t state = SEED;
+    size_t with = 0;
+    for (size_t i = 0; i < chunks; i++) {
+        square += sum[i].square[kind];
+        count += sum[i].count[kind];
+        if (sum[i].count[kind] > 0.0) {
+            chosen[with++] = i;
+        }
     }
+    if (with == 0) {
+        return (struct diagnosis_interval){NAN, NAN, NAN};
+    }
+    for (size_t k = 0; k < RESAMPLES; k++) {
+        double picked = 0.0, of = 0.0;
+        for (size_t i = 0; i < with; i++) {
+            const struct physical *one = &sum[chosen[draw(&state, with)]];
+            picked += one->square[kind];
+            of += one->count[kind];
+        }
+        value[k] = sqrt(picked / of);
+    }
+    qsort(value, RESAMPLES, sizeof value[0], compare);
+    return (struct diagnosis_interval){sqrt(square / count), value[RESAMPLES / 20], value[RESAMPLES - 1 - RESAMPLES / 20]};
 }
 
 static double *figure(struct diagnosis_gap *gap, size_t which) {
     return which == 0 ? &gap->before : which == 1 ? &gap->after_recalibration : &gap->after_effect;
+}
+
+/* The figures of one model: pressure (unless from the duties alone), position and angle. False: out of memory. */
+static bool take_rms(struct diagnosis *diagnosis, const struct replay *replay, const double *residual, size_t chunks, size_t model,
+                     bool from_duties) {
+    struct physical *sum = calloc(chunks + 1, sizeof *sum);
+    size_t *chosen = calloc(chunks + 1, sizeof *chosen);
+    const bool sound = sum != NULL && chosen != NULL;
+    if (sound) {
+        sum_physical(replay, residual, sum);
+    }
+    for (size_t kind = from_duties ? 1 : 0; kind < KINDS && sound; kind++) {
+        struct diagnosis_gap *gap = &diagnosis->gap[from_duties ? kind + 2 : kind];
+        const struct diagnosis_interval rms = rms_of(sum, chunks, kind, chosen);
+        *figure(gap, model) = rms.value;
+        gap->low[model] = rms.low;
+        gap->high[model] = rms.high;
+    }
+    free(sum);
+    free(chosen);
+    return sound;
 }
 
 /* Floor: what noise alone leaves of neighbouring blocks' differences. */
@@ -211,7 +289,7 @@ static void physical_floor(const struct replay *replay, const double *residual, 
             const size_t kind = s < 3 ? 0 : s < 7 ? 1 : 2;
             for (size_t b = 1; b < series[s].count && s != 3; b++) {
                 const size_t at = series[s].start + b * series[s].stride, last = at - series[s].stride;
-                if (replay->weight[at] > 0.0 && replay->weight[last] > 0.0) {
+                if (replay->weight[at] > 0.0 && replay->weight[last] > 0.0 && !replay->apart[at]) {
                     const double step = (residual[at] / replay->weight[at] - residual[last] / replay->weight[last]) * unit[kind];
                     sum[kind] += 0.5 * step * step;
                     count[kind] += 1.0;
@@ -242,7 +320,7 @@ static struct series_structure structure_of(const struct replay *replay, const s
         }
         square += residual[at] * residual[at];
         count += 1.0;
-        if (b > 0 && replay->weight[at - series->stride] > 0.0) {
+        if (b > 0 && replay->weight[at - series->stride] > 0.0 && !replay->apart[at]) {
             step2 += 0.5 * pow(residual[at] - residual[at - series->stride], 2.0);
             pairs += 1.0;
         }
@@ -304,12 +382,9 @@ static bool measure_gaps(struct diagnosis *diagnosis, struct search *search) {
         sound = view_open(&view[m], replay->residuals, chunks) && sound;
     }
     for (size_t m = 0; m < 3 && sound; m++) {
-        double rms[3], floor_of[3];
+        double floor_of[3];
         fill_view(replay, models[m], &state, &view[m]);
-        physical_rms(replay, view[m].residual, rms);
-        for (size_t k = 0; k < 3; k++) {
-            *figure(&diagnosis->gap[k], m) = rms[k];
-        }
+        sound = take_rms(diagnosis, replay, view[m].residual, chunks, m, false);
         if (m == 2) {
             describe_rest(diagnosis, replay, view[m].residual);
             physical_floor(replay, view[m].residual, floor_of);
@@ -320,17 +395,14 @@ static bool measure_gaps(struct diagnosis *diagnosis, struct search *search) {
         double *other = calloc(replay->residuals, sizeof *other);
         if (other != NULL) {
             replay_tip(replay, models[m], &state, true, other);
-            physical_rms(replay, other, rms);
-            *figure(&diagnosis->gap[3], m) = rms[1];
-            *figure(&diagnosis->gap[4], m) = rms[2];
+            sound = take_rms(diagnosis, replay, other, chunks, m, true) && sound;
         }
         free(other);
     }
     if (sound) {
-        const double floor2 = mean_square(&view[2].chunks, view[2].chunks.noise, NULL);
+        const double floor2 = noise_square(&view[2].chunks);
         for (size_t m = 0; m < 3; m++) {
-            const double structured = mean_square(&view[m].chunks, view[m].chunks.square, NULL) -
-                                      mean_square(&view[m].chunks, view[m].chunks.noise, NULL);
+            const double structured = mean_square(&view[m].chunks, view[m].chunks.square, NULL) - noise_square(&view[m].chunks);
             diagnosis->structure[m] = floor2 > 0.0 ? fmax(structured, 0.0) / floor2 : 0.0;
         }
         diagnosis->closed = bootstrap(&view[0].chunks, &view[2].chunks, floor2);

@@ -9,6 +9,7 @@
 #define DIAGNOSIS_WARNINGS_MAX 12
 #define DIAGNOSIS_TEXT_BYTES 320
 #define DIAGNOSIS_RESIDUALS 5
+#define DIAGNOSIS_MODELS 3 /* nominal, recalibrated, with effects */
 
 enum gap_verdict {
     GAP_NONE,
@@ -46,6 +47,8 @@ struct diagnosis_gap {
     double after_recalibration;
     double after_effect;
     double floor;
+    double low[DIAGNOSIS_MODELS];  /* 90 % of the three figures, in their order: blocks of time resampled */
+    double high[DIAGNOSIS_MODELS];
 };
 
 /* What else was tried, each kind by its best: in place of the last effect, or alone where the verdict names none. */

@@ -4,6 +4,8 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "gap/noise_floor.h"
+
 #define PRESSURE_BLOCK_US ((int64_t)(REPLAY_PRESSURE_BLOCK_S * 1e6 + 0.5))
 #define TIP_BLOCK_S REPLAY_TIP_BLOCK_S
 #define HELD_OUT_S 2.5          /* lengths of the blocks that are kept from the fit, every other one */
@@ -180,6 +182,12 @@ static void find_variance(const struct replay *replay, struct replay_run *run) {
             run->variance[3 * block_of_step(replay, run->row_step[row]) + c] += !isnan(data->reading_pa[3 * row + c]);
         }
     }
+    for (size_t i = 0; i < data->breaks; i++) {
+        const size_t row = data->break_row[i], block = block_of_step(replay, run->row_step[row]);
+        for (size_t c = 0; c < 3 && block_of_step(replay, run->row_step[row - 1]) == block; c++) {
+            run->variance[3 * block + c] = 0.0; /* readings from both sides: their mean is neither's */
+        }
+    }
     for (size_t i = 0; i < 3 * run->blocks; i++) {
         const double count = run->variance[i];
         run->variance[i] = count > 0.0 ? one / count + READING_FLOOR_PA * READING_FLOOR_PA : INFINITY;
@@ -205,12 +213,14 @@ static bool open_with_step(struct replay *replay, const struct gap_data *data, c
     }
     replay->weight = calloc(replay->residuals, sizeof *replay->weight);
     replay->held_out = calloc(replay->residuals, sizeof *replay->held_out);
-    if (replay->weight == NULL || replay->held_out == NULL) {
+    replay->apart = calloc(replay->residuals, sizeof *replay->apart);
+    if (replay->weight == NULL || replay->held_out == NULL || replay->apart == NULL) {
         replay_close(replay);
         return false;
     }
     for (size_t i = 0; i < data->runs; i++) {
         mark_held_out(replay, i);
+        noise_floor_mark(replay, i);
     }
     return true;
 }
@@ -247,6 +257,7 @@ void replay_close(struct replay *replay) {
     }
     free(replay->weight);
     free(replay->held_out);
+    free(replay->apart);
     memset(replay, 0, sizeof *replay);
 }
 
@@ -452,6 +463,34 @@ void replay_readings(const struct replay *replay, const struct gap_model *model,
     replay_correct(replay, state);
 }
 
+/* A recording that breaks off and goes on elsewhere: pressures are smoothed on either side, never across. */
+struct stretch {
+    size_t block; /* first of its blocks .. */
+    size_t blocks;
+    size_t step; /* .. and of its steps */
+    size_t end_step;
+};
+
+/* The tip of the row in which a stretch starts is older than the row: its pressures count from a little before it. */
+static size_t first_step(const struct replay *replay, const struct replay_run *run, size_t index) {
+    if (index == 0) {
+        return 0;
+    }
+    const size_t row = run->run->break_row[index - 1], age = (size_t)(GAP_TIP_AGE_S * 1e6 / (double)replay->step_us) + 2;
+    const size_t at = run->row_step[row], before = run->row_step[row - 1];
+    return at - before > 2 * age ? at - age : before + (at - before + 1) / 2;
+}
+
+static struct stretch stretch_of(const struct replay *replay, const struct replay_run *run, size_t index) {
+    const size_t breaks = run->run->breaks;
+    struct stretch stretch = {.step = first_step(replay, run, index),
+                              .end_step = index < breaks ? first_step(replay, run, index + 1) : run->steps + 1};
+    stretch.block = index > 0 ? block_of_step(replay, run->row_step[run->run->break_row[index - 1]]) : 0;
+    const size_t end = index < breaks ? block_of_step(replay, run->row_step[run->run->break_row[index]]) : run->blocks;
+    stretch.blocks = end > stretch.block ? end - stretch.block : 1;
+    return stretch;
+}
+
 /* Without duties the readings are all there is: what the sensors would show of the present guess is taken off, and the
  * smoothed rest added, until the effects on the sensors have settled. Commanded pressures stand in where nothing was read. */
 static void guess_run(const struct replay *replay, const struct gap_model *model, size_t index, struct plant *plant,
@@ -478,9 +517,14 @@ static void guess_run(const struct replay *replay, const struct gap_model *model
                 observed[b] = walk->sum[3 * b + c];
                 variance[b] = run->variance[3 * b + c];
             }
-            if (smoother_run(&run->smoother[c], observed, variance, run->blocks, smoothed)) {
-                for (size_t step = 0; step <= run->steps; step++) {
-                    pressure_pa[3 * step + c] += between(smoothed, 1, run->blocks, block_position(replay, (double)step));
+            for (size_t i = 0; i <= run->run->breaks; i++) {
+                const struct stretch part = stretch_of(replay, run, i);
+                if (!smoother_run(&run->smoother[c], observed + part.block, variance + part.block, part.blocks, smoothed)) {
+                    continue;
+                }
+                for (size_t step = part.step; step < part.end_step; step++) {
+                    const double position = block_position(replay, (double)step) - (double)part.block;
+                    pressure_pa[3 * step + c] += between(smoothed, 1, part.blocks, position);
                 }
             }
         }
@@ -640,6 +684,22 @@ void replay_tip(const struct replay *replay, const struct gap_model *model, cons
 
 /* --- weights --- */
 
+/* How freely a pressure wanders is seen within stretches: the jumps between them are taken off. */
+static void level_stretches(const struct replay *replay, const struct replay_run *run, double *observed) {
+    for (size_t i = 0; i <= run->run->breaks && run->run->breaks > 0 && !run->run->has_duty; i++) {
+        const struct stretch part = stretch_of(replay, run, i);
+        double sum = 0.0, count = 0.0;
+        for (size_t b = part.block; b < part.block + part.blocks; b++) {
+            const bool seen = isfinite(observed[run->blocks + b]);
+            sum += seen ? observed[b] : 0.0;
+            count += seen;
+        }
+        for (size_t b = part.block; b < part.block + part.blocks && count > 0.0; b++) {
+            observed[b] -= sum / count;
+        }
+    }
+}
+
 static bool fit_smoothers(struct replay *replay, struct replay_state *state) {
     for (size_t i = 0; i < replay->runs; i++) {
         struct replay_run *run = &replay->run[i];
@@ -653,6 +713,7 @@ static bool fit_smoothers(struct replay *replay, struct replay_state *state) {
                 room[b] = state->difference[i][3 * b + c];
                 room[run->blocks + b] = run->variance[3 * b + c];
             }
+            level_stretches(replay, run, room);
             const bool rigid = replay->rigid && run->run->has_duty;
             if (!smoother_fit(&run->smoother[c], room, room + run->blocks, run->blocks, rigid, from_readings)) {
                 free(room);

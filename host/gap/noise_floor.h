@@ -1,0 +1,17 @@
+/* Which differences of neighbouring residuals are noise.
+ *
+ * The noise floor is half the mean square of neighbours' differences (von Neumann 1941). That takes the model's error to be
+ * the same in both, which it is not where the recording was cut between them, nor, in a log without duties, while the
+ * pressure moves: how it got from one sample to the next is then not known. Such pairs are marked and left out. With duties
+ * the replay knows what happened in between, and all pairs count but those across a cut. */
+#ifndef TRIBEND_GAP_NOISE_FLOOR_H
+#define TRIBEND_GAP_NOISE_FLOOR_H
+
+#include <stddef.h>
+
+struct replay;
+
+/* Fills replay->apart for one run; its noise levels must be known. */
+void noise_floor_mark(struct replay *replay, size_t run);
+
+#endif
