@@ -399,6 +399,7 @@ static bool measure_gaps(struct diagnosis *diagnosis, struct search *search) {
         }
         free(other);
     }
+    sound = sound && direction_find(&diagnosis->direction, replay, view[0].residual, view[2].residual);
     if (sound) {
         const double floor2 = noise_square(&view[2].chunks);
         for (size_t m = 0; m < 3; m++) {
@@ -469,6 +470,12 @@ static void take_effects(struct diagnosis *diagnosis, const struct search *searc
     size_t index = 2;
     diagnosis->stiffness_scale = interval_of(search, 0, model->stiffness_scale, 5e-4);
     diagnosis->supply_scale = interval_of(search, 1, model->supply_scale, 5e-4);
+    /* without duties nothing shows the supply: the interval is then all that was allowed */
+    struct gap_model bounded = *model;
+    struct gap_parameter bounds[GAP_PARAMETERS_MAX];
+    (void)gap_model_parameters(&bounded, bounds);
+    diagnosis->supply_scale.low = fmax(diagnosis->supply_scale.low, bounds[1].least);
+    diagnosis->supply_scale.high = fmin(diagnosis->supply_scale.high, bounds[1].most);
     for (size_t e = 0; e < model->count; e++) {
         const struct effect *effect = &model->effect[e];
         struct diagnosis_effect part = {.kind = effect->kind};
@@ -657,6 +664,44 @@ static bool in_group(const struct diagnosis *diagnosis, const char *name) {
     return false;
 }
 
+/* Does an entry of the list name the same kinds? */
+static bool names_the_same(const struct gap_model *a, const struct gap_model *b) {
+    bool same = gap_model_kinds(a) == gap_model_kinds(b);
+    for (size_t e = 0; e < a->count; e++) {
+        same = same && names_kind(b, a->effect[e].kind);
+    }
+    return same;
+}
+
+/* Of an unknown gap: the models that come nearest, each set of kinds by its best, in the order of what they leave. */
+static void find_closest(struct diagnosis *diagnosis, const struct search *search) {
+    const double noise = search->best.sums.noise_count[1] > 0.0 ? search->best.sums.noise[1] / search->best.sums.noise_count[1] : 0.0;
+    const double gap = fit_mean_square(&search->nominal.sums, 1) - noise;
+    for (size_t t = 0; t < search->trials && gap > 0.0; t++) {
+        const struct fit *fit = &search->trial[t].fit;
+        const double closed = fit->sound ? 1.0 - (fit_mean_square(&fit->sums, 1) - noise) / gap : -INFINITY;
+        struct diagnosis_closest *list = diagnosis->closest_model;
+        size_t at = 0;
+        while (at < diagnosis->closest && !names_the_same(&list[at].model, &fit->model)) {
+            at++;
+        }
+        if (at < diagnosis->closest) {
+            if (list[at].closed >= closed) {
+                continue;
+            }
+            memmove(&list[at], &list[at + 1], (--diagnosis->closest - at) * sizeof *list);
+        }
+        for (at = 0; at < diagnosis->closest && list[at].closed >= closed;) {
+            at++;
+        }
+        if (at < DIAGNOSIS_CLOSEST_MAX && closed > diagnosis->closed_recalibration.value) {
+            diagnosis->closest += diagnosis->closest < DIAGNOSIS_CLOSEST_MAX;
+            memmove(&list[at + 1], &list[at], (diagnosis->closest - 1 - at) * sizeof *list);
+            list[at] = (struct diagnosis_closest){fit->model, closed};
+        }
+    }
+}
+
 /* What to record next, in words. */
 static void suggest(struct diagnosis *diagnosis) {
     const char *what = "";
@@ -708,6 +753,9 @@ bool diagnosis_conclude(struct diagnosis *diagnosis, struct search *search) {
         (void)snprintf(diagnosis->regime, sizeof diagnosis->regime, "whole run");
     } else {
         *diagnosis->description = '\0';
+    }
+    if (diagnosis->verdict == GAP_UNKNOWN) {
+        find_closest(diagnosis, search);
     }
     doubt_floor(diagnosis, search);
     suggest(diagnosis);
