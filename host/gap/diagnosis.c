@@ -729,8 +729,9 @@ static void doubt_floor(struct diagnosis *diagnosis, const struct search *search
         return;
     }
     diagnosis_warn(diagnosis,
-                   "neighbouring tip samples differ by %.2g deg beyond the model, the sensor errs by %.2g deg: transitions were cut "
-                   "out or sampled too slowly, and a gap smaller than that cannot be seen; record at 50 Hz or more without cuts",
+                   "neighbouring tip samples differ by %.2g deg beyond the model, the sensor errs by %.2g deg: transitions were "
+                   "sampled too slowly, or the tip was moved by what no pressure shows, and a gap smaller than that cannot be seen; "
+                   "record at 50 Hz or more, with the module free",
                    angle->floor, noise_deg);
     if (diagnosis->verdict == GAP_NONE) {
         diagnosis->verdict = GAP_INSUFFICIENT_DATA;

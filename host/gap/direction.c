@@ -5,6 +5,8 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "gap/noise_floor.h"
+
 #define DEGREES (180.0 / M_PI)
 #define BLOCK_S REPLAY_TIP_BLOCK_S
 #define STEP_BLOCKS 10     /* a step is over within half a second .. */
@@ -216,6 +218,8 @@ struct held_out_mean {
 
 static void find_holds(struct direction *direction, const struct replay *replay, size_t index, const struct bends *bends,
                        struct held_out_mean *with_effects) {
+    const struct gap_run *run = replay->run[index].run;
+    const size_t arrival = run->has_reading || run->has_duty ? 0 : (size_t)(NOISE_FLOOR_ARRIVES_S / BLOCK_S + 0.5);
     double most = 0.0;
     for (size_t b = 0; b < bends->count; b++) {
         most = fmax(most, bends->nominal[b]); /* a NaN changes nothing */
@@ -229,8 +233,9 @@ static void find_holds(struct direction *direction, const struct replay *replay,
         while (starts && until < bends->count && stays(bends->nominal, until, until + 1, level, HELD_SHARE * most)) {
             until++;
         }
-        if (starts && until - b >= LEAST_BLOCKS) {
-            take_hold(direction, replay, index, bends, b, until);
+        const size_t from = b + arrival;
+        if (starts && until >= from + LEAST_BLOCKS) {
+            take_hold(direction, replay, index, bends, from, until);
             for (size_t k = until - END_BLOCKS; k < until; k++) {
                 const double left = bends->measured[k] - bends->best[k];
                 const bool counts = !isnan(left) && replay->held_out[replay->run[index].tip_at + REPLAY_TIP_CHANNELS * k];

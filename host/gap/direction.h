@@ -9,7 +9,8 @@
 #define DIRECTION_HOLDS_MAX 64
 #define DIRECTION_TEXT_BYTES 480
 
-/* A stretch of at least a second after a step of the model's bend, in which the model's bend stays. */
+/* A stretch of at least a second after a step of the model's bend, in which the model's bend stays. Where pressures were only
+ * commanded, the first NOISE_FLOOR_ARRIVES_S are left out: when they arrived is not known. */
 struct direction_hold {
     size_t run;
     double from_s; /* of the log */

@@ -4,9 +4,8 @@
 
 #include "gap/replay.h"
 
-#define MOVED_SIGMAS 8.0  /* of one reading's noise: the pressure moved between two rows .. */
-#define MOVED_LEAST_PA 500.0
-#define ARRIVES_S 0.5     /* .. and where only the command is known, it arrives within that after it */
+#define MOVED_SIGMAS 8.0     /* of one reading's noise: by more than that the pressure moved between two rows, */
+#define MOVED_LEAST_PA 500.0 /* and by that */
 
 /* Marks tip and pressure blocks that hold a time, and that the time before them. */
 static void mark_at(struct replay *replay, size_t index, double time_s, double until_s) {
@@ -45,7 +44,7 @@ void noise_floor_mark(struct replay *replay, size_t index) {
     }
     for (size_t row = 1; row < data->rows && !data->has_duty && (data->has_reading || data->has_command); row++) {
         if (moves_in(run, row)) {
-            mark_at(replay, index, data->time_s[row], data->time_s[row] + (data->has_reading ? 0.0 : ARRIVES_S));
+            mark_at(replay, index, data->time_s[row], data->time_s[row] + (data->has_reading ? 0.0 : NOISE_FLOOR_ARRIVES_S));
         }
     }
 }

@@ -9,6 +9,9 @@
 
 #include <stddef.h>
 
+/* Where only the command is known, the pressure has arrived by then after it. */
+#define NOISE_FLOOR_ARRIVES_S 0.5
+
 struct replay;
 
 /* Fills replay->apart for one run; its noise levels must be known. */
