@@ -668,18 +668,21 @@ static bool in_group(const struct diagnosis *diagnosis, const char *name) {
 static bool names_the_same(const struct gap_model *a, const struct gap_model *b) {
     bool same = gap_model_kinds(a) == gap_model_kinds(b);
     for (size_t e = 0; e < a->count; e++) {
-        same = same && names_kind(b, a->effect[e].kind);
+        bool named = false;
+        for (size_t f = 0; f < b->count; f++) {
+            named = named || b->effect[f].kind == a->effect[e].kind;
+        }
+        same = same && named;
     }
     return same;
 }
 
 /* Of an unknown gap: the models that come nearest, each set of kinds by its best, in the order of what they leave. */
 static void find_closest(struct diagnosis *diagnosis, const struct search *search) {
-    const double noise = search->best.sums.noise_count[1] > 0.0 ? search->best.sums.noise[1] / search->best.sums.noise_count[1] : 0.0;
-    const double gap = fit_mean_square(&search->nominal.sums, 1) - noise;
+    const double gap = fit_structure(&search->nominal.sums, 1);
     for (size_t t = 0; t < search->trials && gap > 0.0; t++) {
         const struct fit *fit = &search->trial[t].fit;
-        const double closed = fit->sound ? 1.0 - (fit_mean_square(&fit->sums, 1) - noise) / gap : -INFINITY;
+        const double closed = fit->sound ? 1.0 - fit_structure(&fit->sums, 1) / gap : -INFINITY;
         struct diagnosis_closest *list = diagnosis->closest_model;
         size_t at = 0;
         while (at < diagnosis->closest && !names_the_same(&list[at].model, &fit->model)) {

@@ -289,20 +289,25 @@ static void put_in_words(struct direction *direction) {
     const double end_deg = direction->end_rad * DEGREES, after_deg = direction->just_after_rad * DEGREES;
     char how[160] = "";
     if (fabs(drift_rad) < SMALL_RAD) {
-        (void)snprintf(how, sizeof how, "it does not change over a hold");
-    } else if (isnan(direction->time_constant_s)) {
+        (void)snprintf(direction->text, sizeof direction->text,
+                       "measured bend %s the nominal model's by %.2g deg over %zu hold%s, and that does not change while a pressure "
+                       "is held",
+                       against(end_deg), fabs(end_deg), direction->holds, direction->holds == 1 ? "" : "s");
+        return;
+    }
+    if (isnan(direction->time_constant_s)) {
         (void)snprintf(how, sizeof how, "the module %s after the model has stopped, with no one time constant",
                        drift_rad > 0.0 ? "goes on bending" : "straightens");
     } else {
-        (void)snprintf(how, sizeof how, "the module %s after the model has stopped, with a time constant of %.2g s (%.2g to %.2g s)",
+        (void)snprintf(how, sizeof how, "the module %s after the model has stopped, and the model lags with a time constant of %.2g s (%.2g to %.2g s)",
                        drift_rad > 0.0 ? "goes on bending" : "straightens", direction->time_constant_s,
                        direction->time_constant_low_s, direction->time_constant_high_s);
     }
     (void)snprintf(direction->text, sizeof direction->text,
-                   "measured bend %s the nominal model's by %.2g deg at the end of %zu hold%s and %s it by %.2g deg just after "
-                   "their steps: %s; over a hold it changes by %+.1f to %+.1f %%",
+                   "measured bend %s the nominal model's by %.2g deg at the end of %zu hold%s, and %s it by %.2g deg just after "
+                   "the step%s: %s; over a hold the bend changes by %+.1f to %+.1f %%",
                    against(end_deg), fabs(end_deg), direction->holds, direction->holds == 1 ? "" : "s", against(after_deg),
-                   fabs(after_deg), how, 100.0 * direction->growth_low, 100.0 * direction->growth_high);
+                   fabs(after_deg), direction->holds == 1 ? "" : "s", how, 100.0 * direction->growth_low, 100.0 * direction->growth_high);
 }
 
 bool direction_find(struct direction *direction, const struct replay *replay, const double *nominal, const double *best) {

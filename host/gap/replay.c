@@ -20,6 +20,8 @@
 #define ANGLE_LEAST_RAD (0.008 * M_PI / 180.0)
 #define NUDGE_PA 20.0
 #define MAD_TO_SIGMA 1.4826
+#define UNCLIPPED 8        /* readings in a row without a zero: the chamber is under pressure */
+#define UNCLIPPED_LEAST 50 /* so many of them that their noise is known */
 
 /* --- opening --- */
 
@@ -123,22 +125,41 @@ static double median(double *values, size_t count) {
     return values[count / 2];
 }
 
-/* From the second differences of readings that are not clipped; a ramp drops out. */
-static double noise_of(const double *value, size_t stride, size_t count, double least, double *room) {
-    size_t used = 0;
+/* From the second differences of readings that are not clipped; a ramp drops out. Only those count that follow on at least
+ * `unclipped` others without a zero in between. NAN: there are none. */
+static double noise_of(const double *value, size_t stride, size_t count, size_t unclipped, double least, double *room) {
+    size_t used = 0, in_a_row = 0;
     double before[2] = {NAN, NAN};
     for (size_t i = 0; i < count; i++) {
         const double now = value[i * stride];
+        in_a_row = now == 0.0 ? 0 : in_a_row + (isnan(now) ? 0u : 1u);
         if (isnan(now) || now == 0.0) {
             continue;
         }
-        if (!isnan(before[1])) {
+        if (!isnan(before[1]) && (unclipped == 0 || in_a_row > unclipped)) {
             room[used++] = fabs(now - 2.0 * before[0] + before[1]);
         }
         before[1] = before[0];
         before[0] = now;
     }
-    return fmax(MAD_TO_SIGMA * median(room, used) / sqrt(6.0), least);
+    return used < UNCLIPPED_LEAST && unclipped > 0 ? NAN : fmax(MAD_TO_SIGMA * median(room, used) / sqrt(6.0), least);
+}
+
+/* Of the middle one of the chambers that are under pressure for long enough; of all where none is. A vented chamber's
+ * reading is clipped half of the time, and what is left of its noise looks too small. */
+static double reading_noise(const struct gap_run *data, double *room) {
+    double chamber[3];
+    size_t known = 0;
+    for (size_t c = 0; c < 3; c++) {
+        const double noise_pa = noise_of(data->reading_pa + c, 3, data->rows, UNCLIPPED, READING_LEAST_PA, room);
+        if (!isnan(noise_pa)) {
+            chamber[known++] = noise_pa;
+        }
+    }
+    for (size_t c = 0; c < 3 && known == 0; c++) {
+        chamber[c] = noise_of(data->reading_pa + c, 3, data->rows, 0, READING_LEAST_PA, room);
+    }
+    return median(chamber, known > 0 ? known : 3);
 }
 
 static bool find_noise(struct replay_run *run) {
@@ -150,19 +171,15 @@ static bool find_noise(struct replay_run *run) {
         free(values);
         return false;
     }
-    double chamber[3];
-    for (size_t c = 0; c < 3; c++) {
-        chamber[c] = noise_of(data->reading_pa + c, 3, data->rows, READING_LEAST_PA, room);
-    }
-    run->reading_noise_pa = median(chamber, 3);
-    run->supply_noise_pa = noise_of(data->supply_pa, 1, data->rows, READING_LEAST_PA, room);
+    run->reading_noise_pa = reading_noise(data, room);
+    run->supply_noise_pa = noise_of(data->supply_pa, 1, data->rows, 0, READING_LEAST_PA, room);
     for (size_t kind = 0; kind < 2; kind++) {
         double sum = 0.0;
         for (size_t k = 0; k < 3; k++) {
             for (size_t i = 0; i < data->tips; i++) {
                 values[i] = kind == 0 ? data->tip[i].position_m[k] : 2.0 * data->tip[i].quaternion[1 + k];
             }
-            sum += pow(noise_of(values, 1, data->tips, kind == 0 ? POSITION_LEAST_M : ANGLE_LEAST_RAD, room), 2.0) / 3.0;
+            sum += pow(noise_of(values, 1, data->tips, 0, kind == 0 ? POSITION_LEAST_M : ANGLE_LEAST_RAD, room), 2.0) / 3.0;
         }
         run->tip_noise[kind] = sqrt(sum);
     }

@@ -83,6 +83,9 @@ static void print_closest(FILE *out, const struct diagnosis *diagnosis) {
         fprintf(out, "%-10s%3.0f %% closed by", i == 0 ? "closest" : "", 100.0 * diagnosis->closest_model[i].closed);
         for (size_t e = 0; e < model->count; e++) {
             const struct effect *effect = &model->effect[e];
+            if (gap_model_is_part(model, e)) {
+                continue;
+            }
             fprintf(out, "%s%s", e > 0 ? " and " : " ", effect->kind->name);
             if (effect->chamber > 0) {
                 fprintf(out, " of chamber %zu", effect->chamber);

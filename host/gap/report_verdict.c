@@ -307,6 +307,9 @@ static void write_closest(FILE *out, const struct diagnosis *diagnosis) {
         markup_percent(out, diagnosis->closest_model[i].closed);
         fputs(": ", out);
         for (size_t e = 0; e < model->count; e++) {
+            if (gap_model_is_part(model, e)) {
+                continue;
+            }
             fputs(e > 0 ? " and " : "", out);
             markup_text(out, model->effect[e].kind->name);
             fputs(" <span class=\"muted\">(", out);
