@@ -119,7 +119,7 @@ static void count_series(const struct replay *replay, const struct series *serie
                              replay->weight[at - series->stride] > 0.0;
         view->chunks.apart[chunk] += replay->apart[at];
         const double step = follows ? now - view->residual[at - series->stride] : now;
-        view->chunks.noise[chunk] += follows ? 0.5 * step * step : 0.0;
+        view->chunks.noise[chunk] += follows ? 0.5 * step * step + replay->lasting[at] : 0.0;
     }
 }
 
@@ -291,7 +291,8 @@ static void physical_floor(const struct replay *replay, const double *residual, 
                 const size_t at = series[s].start + b * series[s].stride, last = at - series[s].stride;
                 if (replay->weight[at] > 0.0 && replay->weight[last] > 0.0 && !replay->apart[at]) {
                     const double step = (residual[at] / replay->weight[at] - residual[last] / replay->weight[last]) * unit[kind];
-                    sum[kind] += 0.5 * step * step;
+                    const double lasting = sqrt(replay->lasting[at]) / replay->weight[at] * unit[kind];
+                    sum[kind] += 0.5 * step * step + lasting * lasting;
                     count[kind] += 1.0;
                 }
             }
@@ -321,7 +322,7 @@ static struct series_structure structure_of(const struct replay *replay, const s
         square += residual[at] * residual[at];
         count += 1.0;
         if (b > 0 && replay->weight[at - series->stride] > 0.0 && !replay->apart[at]) {
-            step2 += 0.5 * pow(residual[at] - residual[at - series->stride], 2.0);
+            step2 += 0.5 * pow(residual[at] - residual[at - series->stride], 2.0) + replay->lasting[at];
             pairs += 1.0;
         }
         if (b >= lag && replay->weight[at - lag * series->stride] > 0.0) {
@@ -732,9 +733,9 @@ static void doubt_floor(struct diagnosis *diagnosis, const struct search *search
         return;
     }
     diagnosis_warn(diagnosis,
-                   "neighbouring tip samples differ by %.2g deg beyond the model, the sensor errs by %.2g deg: transitions were "
-                   "sampled too slowly, or the tip was moved by what no pressure shows, and a gap smaller than that cannot be seen; "
-                   "record at 50 Hz or more, with the module free",
+                   "what no model can explain amounts to %.2g deg, the sensor errs by %.2g deg: pressures were read too rarely, "
+                   "transitions were sampled too slowly, or something moved the tip that no pressure shows, and a smaller gap cannot "
+                   "be seen; record valve1..3 at 50 Hz or more, with the module free",
                    angle->floor, noise_deg);
     if (diagnosis->verdict == GAP_NONE) {
         diagnosis->verdict = GAP_INSUFFICIENT_DATA;

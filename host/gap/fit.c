@@ -258,7 +258,7 @@ static void sum_up(const struct fitter *fitter, const double *residual, struct f
                 const size_t start = k < run->supply_at ? run->pressure_at : k < run->tip_at ? run->supply_at : run->tip_at;
                 if (k >= start + stride && replay->weight[k - stride] > 0.0 && replay->held_out[k - stride] == out && !replay->apart[k]) {
                     const double step = residual[k] - residual[k - stride];
-                    part->noise += 0.5 * step * step;
+                    part->noise += 0.5 * step * step + replay->lasting[k];
                     part->noise_count += 1.0;
                 }
             }

@@ -231,7 +231,8 @@ static bool open_with_step(struct replay *replay, const struct gap_data *data, c
     replay->weight = calloc(replay->residuals, sizeof *replay->weight);
     replay->held_out = calloc(replay->residuals, sizeof *replay->held_out);
     replay->apart = calloc(replay->residuals, sizeof *replay->apart);
-    if (replay->weight == NULL || replay->held_out == NULL || replay->apart == NULL) {
+    replay->lasting = calloc(replay->residuals, sizeof *replay->lasting);
+    if (replay->weight == NULL || replay->held_out == NULL || replay->apart == NULL || replay->lasting == NULL) {
         replay_close(replay);
         return false;
     }
@@ -260,6 +261,7 @@ bool replay_open_coarse(struct replay *coarse, const struct replay *fine) {
 void replay_follow(struct replay *coarse, const struct replay *fine) {
     coarse->rigid = fine->rigid;
     memcpy(coarse->weight, fine->weight, fine->residuals * sizeof *fine->weight);
+    memcpy(coarse->lasting, fine->lasting, fine->residuals * sizeof *fine->lasting);
     for (size_t i = 0; i < fine->runs; i++) {
         memcpy(coarse->run[i].smoother, fine->run[i].smoother, sizeof fine->run[i].smoother);
         coarse->run[i].duty_from_next_period = fine->run[i].duty_from_next_period;
@@ -275,6 +277,7 @@ void replay_close(struct replay *replay) {
     free(replay->weight);
     free(replay->held_out);
     free(replay->apart);
+    free(replay->lasting);
     memset(replay, 0, sizeof *replay);
 }
 
@@ -797,6 +800,8 @@ static bool weigh_tip(struct replay *replay, const struct gap_model *model, cons
             const double variance = noise * noise / fmax((double)count, 1.0) + floor_of * floor_of +
                                     spread2[REPLAY_TIP_CHANNELS * b + k];
             replay->weight[run->tip_at + REPLAY_TIP_CHANNELS * b + k] = seen ? 1.0 / sqrt(variance) : 0.0;
+            replay->lasting[run->tip_at + REPLAY_TIP_CHANNELS * b + k] =
+                run->run->has_duty ? 0.0 : spread2[REPLAY_TIP_CHANNELS * b + k] / variance;
         }
     }
     free(mean);

@@ -55,6 +55,7 @@ struct replay {
     bool rigid;        /* pressures are as the duties make them, but for a constant: the tip then tells of them finest */
     double *weight;    /* [residuals] 1 / (noise of a block) */
     uint8_t *held_out; /* [residuals] 1: not used to fit */
+    double *lasting;   /* [residuals] share of a block's noise that its neighbours have too; see noise_floor.h */
     uint8_t *apart;    /* [residuals] 1: its difference from the block before says nothing of the noise; see noise_floor.h */
 };
 
