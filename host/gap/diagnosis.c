@@ -35,6 +35,8 @@
 #define DOUBTFUL_CHANGE 0.1    /* share of its movement by which our table model may miss another simulator's tip */
 #define CHUNK_S 2.5      /* of the bootstrap */
 #define RESAMPLES 400
+#define SEED 0x9e3779b97f4a7c15u
+#define KINDS 3          /* of residuals: pressure, position, angle */
 
 const char *gap_verdict_name(enum gap_verdict verdict) {
     static const char *const names[GAP_VERDICT_COUNT] = {"no-gap", "recalibrate", "effect",           "effects",
@@ -59,6 +61,7 @@ struct chunks {
     double *square;   /* sum of squares */
     double *noise;    /* sum of squares of half differences of neighbours: noise alone */
     double *residual; /* how many */
+    double *apart;    /* how many of them have a neighbour whose difference is no noise */
 };
 
 struct model_view {
@@ -72,8 +75,9 @@ static bool view_open(struct model_view *view, size_t residuals, size_t chunks) 
     view->chunks.square = calloc(chunks + 1, sizeof(double));
     view->chunks.noise = calloc(chunks + 1, sizeof(double));
     view->chunks.residual = calloc(chunks + 1, sizeof(double));
+    view->chunks.apart = calloc(chunks + 1, sizeof(double));
     return view->residual != NULL && view->chunks.square != NULL && view->chunks.noise != NULL &&
-           view->chunks.residual != NULL;
+           view->chunks.residual != NULL && view->chunks.apart != NULL;
 }
 
 static void view_close(struct model_view *view) {
@@ -81,6 +85,7 @@ static void view_close(struct model_view *view) {
     free(view->chunks.square);
     free(view->chunks.noise);
     free(view->chunks.residual);
+    free(view->chunks.apart);
 }
 
 struct series {
@@ -120,9 +125,11 @@ static void count_series(const struct replay *replay, const struct series *serie
         const double now = view->residual[at];
         view->chunks.square[chunk] += now * now;
         view->chunks.residual[chunk] += 1.0;
-        const bool follows = b > 0 && replay->held_out[at - series->stride] && replay->weight[at - series->stride] > 0.0;
+        const bool follows = b > 0 && !replay->apart[at] && replay->held_out[at - series->stride] &&
+                             replay->weight[at - series->stride] > 0.0;
+        view->chunks.apart[chunk] += replay->apart[at];
         const double step = follows ? now - view->residual[at - series->stride] : now;
-        view->chunks.noise[chunk] += follows ? 0.5 * step * step : 0.0;
+        view->chunks.noise[chunk] += follows ? 0.5 * step * step + replay->lasting[at] : 0.0;
     }
 }
 
@@ -152,6 +159,16 @@ static double mean_square(const struct chunks *chunks, const double *sum, const 
     return count > 0.0 ? total / count : 0.0;
 }
 
+/* What noise alone makes of a mean square. */
+static double noise_square(const struct chunks *chunks) {
+    double total = 0.0, count = 0.0;
+    for (size_t i = 0; i < chunks->count; i++) {
+        total += chunks->noise[i];
+        count += chunks->residual[i] - chunks->apart[i];
+    }
+    return count > 0.0 ? total / count : 0.0;
+}
+
 static double share_closed(const struct chunks *before, const struct chunks *after, double floor2, const size_t *pick) {
     const double gap = mean_square(before, before->square, pick) - floor2;
     return gap > 0.0 ? 1.0 - (mean_square(after, after->square, pick) - floor2) / gap : 0.0;
@@ -162,16 +179,20 @@ static int compare(const void *a, const void *b) {
     return (x > y) - (x < y);
 }
 
+static size_t draw(uint64_t *state, size_t count) {
+    *state = *state * 6364136223846793005u + 1442695040888963407u;
+    return (size_t)((*state >> 33) % count);
+}
+
 /* Interval by resampling chunks of time (Efron and Tibshirani 1993), seeded: the same answer every time. */
 static struct diagnosis_interval bootstrap(const struct chunks *before, const struct chunks *after, double floor2) {
     double value[RESAMPLES];
     size_t *pick = calloc(before->count + 1, sizeof *pick);
-    uint64_t state = 0x9e3779b97f4a7c15u;
+    uint64_t state = SEED;
     struct diagnosis_interval interval = {share_closed(before, after, floor2, NULL), 0.0, 0.0};
     for (size_t k = 0; k < RESAMPLES && pick != NULL; k++) {
         for (size_t i = 0; i < before->count; i++) {
-            state = state * 6364136223846793005u + 1442695040888963407u;
-            pick[i] = (size_t)((state >> 33) % before->count);
+            pick[i] = draw(&state, before->count);
         }
         value[k] = share_closed(before, after, floor2, pick);
     }
@@ -184,30 +205,87 @@ static struct diagnosis_interval bootstrap(const struct chunks *before, const st
     return interval;
 }
 
-/* Root mean square of held-out blocks in physical units: r1 in kPa, positions in mm, angles in degrees. */
-static void physical_rms(const struct replay *replay, const double *residual, double rms[3]) {
-    double sum[3] = {0.0, 0.0, 0.0}, count[3] = {0.0, 0.0, 0.0};
-    static const double unit[3] = {1e-3, 1e3, DEGREES};
+/* Sums of squares in physical units, and counts, of the held-out blocks of one chunk of time. */
+struct physical {
+    double square[KINDS];
+    double count[KINDS];
+};
+
+/* r1 in kPa, positions in mm, angles in degrees; `sum` by chunk. */
+static void sum_physical(const struct replay *replay, const double *residual, struct physical *sum) {
+    static const double unit[KINDS] = {1e-3, 1e3, DEGREES};
+    size_t first_chunk = 0;
     for (size_t i = 0; i < replay->runs; i++) {
-        const struct replay_run *run = &replay->run[i];
-        const size_t end = run->tip_at + REPLAY_TIP_CHANNELS * run->tip_blocks;
-        for (size_t k = run->pressure_at; k < end; k++) {
-            const bool supply = k >= run->supply_at && k < run->tip_at;
-            const size_t kind = k < run->supply_at ? 0 : (k - run->tip_at) % REPLAY_TIP_CHANNELS < 3 ? 1 : 2;
-            if (!supply && replay->held_out[k] && replay->weight[k] > 0.0) {
-                const double value = residual[k] / replay->weight[k] * unit[kind];
-                sum[kind] += value * value;
-                count[kind] += 1.0;
+        struct series series[10];
+        const size_t all = list_series(replay, i, first_chunk, series);
+        for (size_t s = 0; s < all; s++) {
+            const size_t kind = s < 3 ? 0 : s < 7 ? 1 : 2;
+            for (size_t b = 0; b < series[s].count && s != 3; b++) {
+                const size_t at = series[s].start + b * series[s].stride;
+                const size_t chunk = first_chunk + (size_t)((double)b * series[s].block_s / CHUNK_S);
+                if (replay->held_out[at] && replay->weight[at] > 0.0) {
+                    const double value = residual[at] / replay->weight[at] * unit[kind];
+                    sum[chunk].square[kind] += value * value;
+                    sum[chunk].count[kind] += 1.0;
+                }
             }
         }
+        first_chunk += chunks_of(&replay->run[i]);
     }
-    for (size_t kind = 0; kind < 3; kind++) {
-        rms[kind] = count[kind] > 0.0 ? sqrt(sum[kind] / count[kind]) : NAN;
+}
+
+/* Root mean square of one kind, with an interval from resampling the chunks that have any of it. `chosen` is room for one
+ * index a chunk. */
+static struct diagnosis_interval rms_of(const struct physical *sum, size_t chunks, size_t kind, size_t *chosen) {
+    double square = 0.0, count = 0.0, value[RESAMPLES];
+    uint64_t state = SEED;
+    size_t with = 0;
+    for (size_t i = 0; i < chunks; i++) {
+        square += sum[i].square[kind];
+        count += sum[i].count[kind];
+        if (sum[i].count[kind] > 0.0) {
+            chosen[with++] = i;
+        }
     }
+    if (with == 0) {
+        return (struct diagnosis_interval){NAN, NAN, NAN};
+    }
+    for (size_t k = 0; k < RESAMPLES; k++) {
+        double picked = 0.0, of = 0.0;
+        for (size_t i = 0; i < with; i++) {
+            const struct physical *one = &sum[chosen[draw(&state, with)]];
+            picked += one->square[kind];
+            of += one->count[kind];
+        }
+        value[k] = sqrt(picked / of);
+    }
+    qsort(value, RESAMPLES, sizeof value[0], compare);
+    return (struct diagnosis_interval){sqrt(square / count), value[RESAMPLES / 20], value[RESAMPLES - 1 - RESAMPLES / 20]};
 }
 
 static double *figure(struct diagnosis_gap *gap, size_t which) {
     return which == 0 ? &gap->before : which == 1 ? &gap->after_recalibration : &gap->after_effect;
+}
+
+/* The figures of one model: pressure (unless from the duties alone), position and angle. False: out of memory. */
+static bool take_rms(struct diagnosis *diagnosis, const struct replay *replay, const double *residual, size_t chunks, size_t model,
+                     bool from_duties) {
+    struct physical *sum = calloc(chunks + 1, sizeof *sum);
+    size_t *chosen = calloc(chunks + 1, sizeof *chosen);
+    const bool sound = sum != NULL && chosen != NULL;
+    if (sound) {
+        sum_physical(replay, residual, sum);
+    }
+    for (size_t kind = from_duties ? 1 : 0; kind < KINDS && sound; kind++) {
+        struct diagnosis_gap *gap = &diagnosis->gap[from_duties ? kind + 2 : kind];
+        const struct diagnosis_interval rms = rms_of(sum, chunks, kind, chosen);
+        *figure(gap, model) = rms.value;
+        gap->low[model] = rms.low;
+        gap->high[model] = rms.high;
+    }
+    free(sum);
+    free(chosen);
+    return sound;
 }
 
 /* Floor: what noise alone leaves of neighbouring blocks' differences. */
@@ -221,9 +299,10 @@ static void physical_floor(const struct replay *replay, const double *residual, 
             const size_t kind = s < 3 ? 0 : s < 7 ? 1 : 2;
             for (size_t b = 1; b < series[s].count && s != 3; b++) {
                 const size_t at = series[s].start + b * series[s].stride, last = at - series[s].stride;
-                if (replay->weight[at] > 0.0 && replay->weight[last] > 0.0) {
+                if (replay->weight[at] > 0.0 && replay->weight[last] > 0.0 && !replay->apart[at]) {
                     const double step = (residual[at] / replay->weight[at] - residual[last] / replay->weight[last]) * unit[kind];
-                    sum[kind] += 0.5 * step * step;
+                    const double lasting = sqrt(replay->lasting[at]) / replay->weight[at] * unit[kind];
+                    sum[kind] += 0.5 * step * step + lasting * lasting;
                     count[kind] += 1.0;
                 }
             }
@@ -252,8 +331,8 @@ static struct series_structure structure_of(const struct replay *replay, const s
         }
         square += residual[at] * residual[at];
         count += 1.0;
-        if (b > 0 && replay->weight[at - series->stride] > 0.0) {
-            step2 += 0.5 * pow(residual[at] - residual[at - series->stride], 2.0);
+        if (b > 0 && replay->weight[at - series->stride] > 0.0 && !replay->apart[at]) {
+            step2 += 0.5 * pow(residual[at] - residual[at - series->stride], 2.0) + replay->lasting[at];
             pairs += 1.0;
         }
         if (b >= lag && replay->weight[at - lag * series->stride] > 0.0) {
@@ -314,12 +393,9 @@ static bool measure_gaps(struct diagnosis *diagnosis, struct search *search) {
         sound = view_open(&view[m], replay->residuals, chunks) && sound;
     }
     for (size_t m = 0; m < 3 && sound; m++) {
-        double rms[3], floor_of[3];
+        double floor_of[3];
         fill_view(replay, models[m], &state, &view[m]);
-        physical_rms(replay, view[m].residual, rms);
-        for (size_t k = 0; k < 3; k++) {
-            *figure(&diagnosis->gap[k], m) = rms[k];
-        }
+        sound = take_rms(diagnosis, replay, view[m].residual, chunks, m, false);
         if (m == 2) {
             describe_rest(diagnosis, replay, view[m].residual);
             physical_floor(replay, view[m].residual, floor_of);
@@ -330,17 +406,15 @@ static bool measure_gaps(struct diagnosis *diagnosis, struct search *search) {
         double *other = calloc(replay->residuals, sizeof *other);
         if (other != NULL) {
             replay_tip(replay, models[m], &state, true, other);
-            physical_rms(replay, other, rms);
-            *figure(&diagnosis->gap[3], m) = rms[1];
-            *figure(&diagnosis->gap[4], m) = rms[2];
+            sound = take_rms(diagnosis, replay, other, chunks, m, true) && sound;
         }
         free(other);
     }
+    sound = sound && direction_find(&diagnosis->direction, replay, view[0].residual, view[2].residual);
     if (sound) {
-        const double floor2 = mean_square(&view[2].chunks, view[2].chunks.noise, NULL);
+        const double floor2 = noise_square(&view[2].chunks);
         for (size_t m = 0; m < 3; m++) {
-            const double structured = mean_square(&view[m].chunks, view[m].chunks.square, NULL) -
-                                      mean_square(&view[m].chunks, view[m].chunks.noise, NULL);
+            const double structured = mean_square(&view[m].chunks, view[m].chunks.square, NULL) - noise_square(&view[m].chunks);
             diagnosis->structure[m] = floor2 > 0.0 ? fmax(structured, 0.0) / floor2 : 0.0;
         }
         diagnosis->closed = bootstrap(&view[0].chunks, &view[2].chunks, floor2);
@@ -439,6 +513,12 @@ static void take_effects(struct diagnosis *diagnosis, const struct search *searc
     if (search->data->from_simulator) { /* its supply is in its pressures: there is nothing to fit */
         diagnosis->supply_scale = (struct diagnosis_interval){1.0, 1.0, 1.0};
     }
+    /* without duties nothing shows the supply: the interval is then all that was allowed */
+    struct gap_model bounded = *model;
+    struct gap_parameter bounds[GAP_PARAMETERS_MAX];
+    (void)gap_model_parameters(&bounded, bounds);
+    diagnosis->supply_scale.low = fmax(diagnosis->supply_scale.low, bounds[1].least);
+    diagnosis->supply_scale.high = fmin(diagnosis->supply_scale.high, bounds[1].most);
     for (size_t e = 0; e < model->count; e++) {
         const struct effect *effect = &model->effect[e];
         struct diagnosis_effect part = {.kind = effect->kind};
@@ -821,6 +901,47 @@ static bool in_group(const struct diagnosis *diagnosis, const char *name) {
     return false;
 }
 
+/* Does an entry of the list name the same kinds? */
+static bool names_the_same(const struct gap_model *a, const struct gap_model *b) {
+    bool same = gap_model_kinds(a) == gap_model_kinds(b);
+    for (size_t e = 0; e < a->count; e++) {
+        bool named = false;
+        for (size_t f = 0; f < b->count; f++) {
+            named = named || b->effect[f].kind == a->effect[e].kind;
+        }
+        same = same && named;
+    }
+    return same;
+}
+
+/* Of an unknown gap: the models that come nearest, each set of kinds by its best, in the order of what they leave. */
+static void find_closest(struct diagnosis *diagnosis, const struct search *search) {
+    const double gap = fit_structure(&search->nominal.sums, 1);
+    for (size_t t = 0; t < search->trials && gap > 0.0; t++) {
+        const struct fit *fit = &search->trial[t].fit;
+        const double closed = fit->sound ? 1.0 - fit_structure(&fit->sums, 1) / gap : -INFINITY;
+        struct diagnosis_closest *list = diagnosis->closest_model;
+        size_t at = 0;
+        while (at < diagnosis->closest && !names_the_same(&list[at].model, &fit->model)) {
+            at++;
+        }
+        if (at < diagnosis->closest) {
+            if (list[at].closed >= closed) {
+                continue;
+            }
+            memmove(&list[at], &list[at + 1], (--diagnosis->closest - at) * sizeof *list);
+        }
+        for (at = 0; at < diagnosis->closest && list[at].closed >= closed;) {
+            at++;
+        }
+        if (at < DIAGNOSIS_CLOSEST_MAX && closed > diagnosis->closed_recalibration.value) {
+            diagnosis->closest += diagnosis->closest < DIAGNOSIS_CLOSEST_MAX;
+            memmove(&list[at + 1], &list[at], (diagnosis->closest - 1 - at) * sizeof *list);
+            list[at] = (struct diagnosis_closest){fit->model, closed};
+        }
+    }
+}
+
 /* What to record next, in words. */
 static void suggest(struct diagnosis *diagnosis) {
     const char *what = "";
@@ -848,8 +969,9 @@ static void doubt_floor(struct diagnosis *diagnosis, const struct search *search
         return;
     }
     diagnosis_warn(diagnosis,
-                   "neighbouring tip samples differ by %.2g deg beyond the model, the sensor errs by %.2g deg: transitions were cut "
-                   "out or sampled too slowly, and a gap smaller than that cannot be seen; record at 50 Hz or more without cuts",
+                   "what no model can explain amounts to %.2g deg, the sensor errs by %.2g deg: pressures were read too rarely, "
+                   "transitions were sampled too slowly, or something moved the tip that no pressure shows, and a smaller gap cannot "
+                   "be seen; record valve1..3 at 50 Hz or more, with the module free",
                    angle->floor, noise_deg);
     if (diagnosis->verdict == GAP_NONE) {
         diagnosis->verdict = GAP_INSUFFICIENT_DATA;
@@ -872,6 +994,9 @@ bool diagnosis_conclude(struct diagnosis *diagnosis, struct search *search) {
         (void)snprintf(diagnosis->regime, sizeof diagnosis->regime, "whole run");
     } else {
         *diagnosis->description = '\0';
+    }
+    if (diagnosis->verdict == GAP_UNKNOWN) {
+        find_closest(diagnosis, search);
     }
     doubt_floor(diagnosis, search);
     suggest(diagnosis);

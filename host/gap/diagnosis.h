@@ -3,12 +3,15 @@
 #define TRIBEND_GAP_DIAGNOSIS_H
 
 #include "gap/dependence.h"
+#include "gap/direction.h"
 #include "gap/search.h"
 
 #define DIAGNOSIS_NAMES_MAX 8
 #define DIAGNOSIS_WARNINGS_MAX 12
 #define DIAGNOSIS_TEXT_BYTES 320
+#define DIAGNOSIS_CLOSEST_MAX 4
 #define DIAGNOSIS_RESIDUALS 5
+#define DIAGNOSIS_MODELS 3 /* nominal, recalibrated, with effects */
 
 enum gap_verdict {
     GAP_NONE,
@@ -46,6 +49,8 @@ struct diagnosis_gap {
     double after_recalibration;
     double after_effect;
     double floor;
+    double low[DIAGNOSIS_MODELS];  /* 90 % of the three figures, in their order: blocks of time resampled */
+    double high[DIAGNOSIS_MODELS];
 };
 
 /* What else was tried, each kind by its best: in place of the last effect, or alone where the verdict names none. */
@@ -53,6 +58,12 @@ struct diagnosis_alternative {
     const struct effect *effect;
     double probability;
     double structure; /* left, in units of the noise's mean square */
+};
+
+/* A model that was tried, and the share of the held-out gap that it closes beyond the noise floor. */
+struct diagnosis_closest {
+    struct gap_model model;
+    double closed;
 };
 
 struct diagnosis {
@@ -77,6 +88,9 @@ struct diagnosis {
     bool rest_chamber[3];
     struct dependences dependences;                  /* where inside a stage; of the best model too where that is no explanation */
     char description[DIAGNOSIS_TEXT_BYTES];          /* of an unknown gap */
+    struct direction direction;                      /* which way the gap goes while a pressure is held */
+    size_t closest;                                  /* of an unknown gap: what comes nearest, best first */
+    struct diagnosis_closest closest_model[DIAGNOSIS_CLOSEST_MAX];
     char next_experiment[DIAGNOSIS_TEXT_BYTES];
     size_t warnings;
     char warning[DIAGNOSIS_WARNINGS_MAX][DIAGNOSIS_TEXT_BYTES];

@@ -256,9 +256,9 @@ static void sum_up(const struct fitter *fitter, const double *residual, struct f
                 part->count += 1.0;
                 const size_t stride = k < run->supply_at ? 3 : k < run->tip_at ? 1 : REPLAY_TIP_CHANNELS;
                 const size_t start = k < run->supply_at ? run->pressure_at : k < run->tip_at ? run->supply_at : run->tip_at;
-                if (k >= start + stride && replay->weight[k - stride] > 0.0 && replay->held_out[k - stride] == out) {
+                if (k >= start + stride && replay->weight[k - stride] > 0.0 && replay->held_out[k - stride] == out && !replay->apart[k]) {
                     const double step = residual[k] - residual[k - stride];
-                    part->noise += 0.5 * step * step;
+                    part->noise += 0.5 * step * step + replay->lasting[k];
                     part->noise_count += 1.0;
                 }
             }

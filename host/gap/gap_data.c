@@ -10,7 +10,6 @@
 #include "log/run_log.h"
 #include "safety/supervisor.h"
 
-#define TIP_AGE_S 0.010      /* a pose is this old in the row in which it arrives (nominal sensor) */
 #define UNIT_TOLERANCE 0.05  /* of a quaternion's length */
 #define MOVING_LEAST 20     /* samples that say anything */
 #define WINDOW 5             /* samples on either side .. */
@@ -62,7 +61,7 @@ static bool is_repeat(const struct gap_tip *a, const struct gap_tip *b) {
 static bool take_tip(struct gap_run *run, const struct run_log *log, size_t row, const int column[8]) {
     struct gap_tip *tip = &run->tip[run->tips];
     double size = 0.0;
-    *tip = (struct gap_tip){.time_s = run->time_s[row] - TIP_AGE_S};
+    *tip = (struct gap_tip){.time_s = run->time_s[row] - GAP_TIP_AGE_S};
     for (size_t i = 0; i < 3; i++) {
         tip->position_m[i] = cell(log, row, column[i]);
     }
@@ -119,6 +118,35 @@ static void find_cuts(struct gap_run *run, const struct run_log *log) {
     }
 }
 
+/* The first row at or after a time that was written down with three decimals. */
+static size_t row_at(const struct gap_run *run, double time_s) {
+    size_t row = 0;
+    while (row < run->rows && run->time_s[row] < time_s - 6e-4) {
+        row++;
+    }
+    return row;
+}
+
+/* Where somebody cut the recording: the import wrote down when its segments start. False: out of memory. */
+static bool find_breaks(struct gap_run *run, const struct run_log *log) {
+    const char *text = run_log_metadata(log, "segments");
+    run->break_row = calloc(run->rows + 1, sizeof *run->break_row);
+    while (run->break_row != NULL && text != NULL) {
+        char *end;
+        const double start_s = strtod(text, &end);
+        if (end == text) {
+            break;
+        }
+        const size_t row = row_at(run, start_s);
+        const size_t last = run->breaks > 0 ? run->break_row[run->breaks - 1] : 0;
+        if (row > last && row < run->rows) {
+            run->break_row[run->breaks++] = row;
+        }
+        text = end;
+    }
+    return run->break_row != NULL;
+}
+
 static bool out_of_memory(struct gap_run *run, char *error, size_t error_bytes) {
     (void)snprintf(error, error_bytes, "%s: out of memory", run->path);
     return false;
@@ -164,6 +192,9 @@ static bool take_log(struct gap_run *run, const struct run_log *log, char *error
     }
     count_repeats(run);
     find_cuts(run, log);
+    if (!find_breaks(run, log)) {
+        return out_of_memory(run, error, error_bytes);
+    }
     return gap_baseline_take(run, log, error, error_bytes);
 }
 
@@ -218,6 +249,7 @@ void gap_data_free(struct gap_data *data) {
         free(run->temperature_k);
         free(run->tip);
         free(run->cut);
+        free(run->break_row);
     }
     memset(data, 0, sizeof *data);
 }

@@ -8,6 +8,7 @@
 
 #define GAP_RUNS_MAX 64
 #define GAP_PATH_BYTES 256
+#define GAP_TIP_AGE_S 0.010 /* a pose is this old in the row in which it arrives (nominal sensor) */
 
 struct gap_tip {
     double time_s;        /* when the pose was true: the row's time less the sensor's nominal age */
@@ -34,6 +35,8 @@ struct gap_run {
     double *reading_pa;    /* [rows * 3]; NAN where not measured */
     double *command_pa;    /* [rows * 3] */
     bool *cut;             /* [rows]; the controller de-energises all coils in this row, inside a period too */
+    size_t breaks;         /* how often the recording breaks off and goes on elsewhere .. */
+    size_t *break_row;     /* [breaks] .. and the rows from which on it does */
     double *supply_pa;     /* [rows] */
     double *temperature_k; /* [rows] */
     bool has_duty;         /* pressures can be simulated without the readings: from duties, or they are another simulator's */

@@ -4,6 +4,7 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "gap/noise_floor.h"
 #include "gap/replay_elsewhere.h"
 
 #define PRESSURE_BLOCK_US ((int64_t)(REPLAY_PRESSURE_BLOCK_S * 1e6 + 0.5))
@@ -20,6 +21,8 @@
 #define ANGLE_LEAST_RAD (0.008 * M_PI / 180.0)
 #define NUDGE_PA 20.0
 #define MAD_TO_SIGMA 1.4826
+#define UNCLIPPED 8        /* readings in a row without a zero: the chamber is under pressure */
+#define UNCLIPPED_LEAST 50 /* so many of them that their noise is known */
 
 /* --- opening --- */
 
@@ -123,22 +126,41 @@ static double median(double *values, size_t count) {
     return values[count / 2];
 }
 
-/* From the second differences of readings that are not clipped; a ramp drops out. */
-static double noise_of(const double *value, size_t stride, size_t count, double least, double *room) {
-    size_t used = 0;
+/* From the second differences of readings that are not clipped; a ramp drops out. Only those count that follow on at least
+ * `unclipped` others without a zero in between. NAN: there are none. */
+static double noise_of(const double *value, size_t stride, size_t count, size_t unclipped, double least, double *room) {
+    size_t used = 0, in_a_row = 0;
     double before[2] = {NAN, NAN};
     for (size_t i = 0; i < count; i++) {
         const double now = value[i * stride];
+        in_a_row = now == 0.0 ? 0 : in_a_row + (isnan(now) ? 0u : 1u);
         if (isnan(now) || now == 0.0) {
             continue;
         }
-        if (!isnan(before[1])) {
+        if (!isnan(before[1]) && (unclipped == 0 || in_a_row > unclipped)) {
             room[used++] = fabs(now - 2.0 * before[0] + before[1]);
         }
         before[1] = before[0];
         before[0] = now;
     }
-    return fmax(MAD_TO_SIGMA * median(room, used) / sqrt(6.0), least);
+    return used < UNCLIPPED_LEAST && unclipped > 0 ? NAN : fmax(MAD_TO_SIGMA * median(room, used) / sqrt(6.0), least);
+}
+
+/* Of the middle one of the chambers that are under pressure for long enough; of all where none is. A vented chamber's
+ * reading is clipped half of the time, and what is left of its noise looks too small. */
+static double reading_noise(const struct gap_run *data, double *room) {
+    double chamber[3];
+    size_t known = 0;
+    for (size_t c = 0; c < 3; c++) {
+        const double noise_pa = noise_of(data->reading_pa + c, 3, data->rows, UNCLIPPED, READING_LEAST_PA, room);
+        if (!isnan(noise_pa)) {
+            chamber[known++] = noise_pa;
+        }
+    }
+    for (size_t c = 0; c < 3 && known == 0; c++) {
+        chamber[c] = noise_of(data->reading_pa + c, 3, data->rows, 0, READING_LEAST_PA, room);
+    }
+    return median(chamber, known > 0 ? known : 3);
 }
 
 static bool find_noise(struct replay_run *run) {
@@ -150,12 +172,8 @@ static bool find_noise(struct replay_run *run) {
         free(values);
         return false;
     }
-    double chamber[3];
-    for (size_t c = 0; c < 3; c++) {
-        chamber[c] = noise_of(data->reading_pa + c, 3, data->rows, READING_LEAST_PA, room);
-    }
-    run->reading_noise_pa = median(chamber, 3);
-    run->supply_noise_pa = noise_of(data->supply_pa, 1, data->rows, READING_LEAST_PA, room);
+    run->reading_noise_pa = reading_noise(data, room);
+    run->supply_noise_pa = noise_of(data->supply_pa, 1, data->rows, 0, READING_LEAST_PA, room);
     for (size_t kind = 0; kind < 2; kind++) {
         double sum = 0.0;
         for (size_t k = 0; k < 3; k++) {
@@ -163,7 +181,7 @@ static bool find_noise(struct replay_run *run) {
                 values[i] = kind == 0 ? data->tip[i].position_m[k] : 2.0 * data->tip[i].quaternion[1 + k];
                 values[i] -= data->sim_tip == NULL ? 0.0 : replay_elsewhere_noise_part(data, i, kind, k);
             }
-            sum += pow(noise_of(values, 1, data->tips, kind == 0 ? POSITION_LEAST_M : ANGLE_LEAST_RAD, room), 2.0) / 3.0;
+            sum += pow(noise_of(values, 1, data->tips, 0, kind == 0 ? POSITION_LEAST_M : ANGLE_LEAST_RAD, room), 2.0) / 3.0;
         }
         run->tip_noise[kind] = sqrt(sum);
     }
@@ -181,6 +199,12 @@ static void find_variance(const struct replay *replay, struct replay_run *run) {
     for (size_t row = 0; row < data->rows; row++) {
         for (size_t c = 0; c < 3; c++) {
             run->variance[3 * block_of_step(replay, run->row_step[row]) + c] += !isnan(data->reading_pa[3 * row + c]);
+        }
+    }
+    for (size_t i = 0; i < data->breaks; i++) {
+        const size_t row = data->break_row[i], block = block_of_step(replay, run->row_step[row]);
+        for (size_t c = 0; c < 3 && block_of_step(replay, run->row_step[row - 1]) == block; c++) {
+            run->variance[3 * block + c] = 0.0; /* readings from both sides: their mean is neither's */
         }
     }
     for (size_t i = 0; i < 3 * run->blocks; i++) {
@@ -209,12 +233,15 @@ static bool open_with_step(struct replay *replay, const struct gap_data *data, c
     }
     replay->weight = calloc(replay->residuals, sizeof *replay->weight);
     replay->held_out = calloc(replay->residuals, sizeof *replay->held_out);
-    if (replay->weight == NULL || replay->held_out == NULL) {
+    replay->apart = calloc(replay->residuals, sizeof *replay->apart);
+    replay->lasting = calloc(replay->residuals, sizeof *replay->lasting);
+    if (replay->weight == NULL || replay->held_out == NULL || replay->apart == NULL || replay->lasting == NULL) {
         replay_close(replay);
         return false;
     }
     for (size_t i = 0; i < data->runs; i++) {
         mark_held_out(replay, i);
+        noise_floor_mark(replay, i);
     }
     return true;
 }
@@ -238,6 +265,7 @@ void replay_follow(struct replay *coarse, const struct replay *fine) {
     coarse->rigid = fine->rigid;
     coarse->elsewhere = fine->elsewhere;
     memcpy(coarse->weight, fine->weight, fine->residuals * sizeof *fine->weight);
+    memcpy(coarse->lasting, fine->lasting, fine->residuals * sizeof *fine->lasting);
     for (size_t i = 0; i < fine->runs; i++) {
         memcpy(coarse->run[i].smoother, fine->run[i].smoother, sizeof fine->run[i].smoother);
         coarse->run[i].duty_from_next_period = fine->run[i].duty_from_next_period;
@@ -252,6 +280,8 @@ void replay_close(struct replay *replay) {
     }
     free(replay->weight);
     free(replay->held_out);
+    free(replay->apart);
+    free(replay->lasting);
     memset(replay, 0, sizeof *replay);
 }
 
@@ -457,6 +487,34 @@ void replay_readings(const struct replay *replay, const struct gap_model *model,
     replay_correct(replay, state);
 }
 
+/* A recording that breaks off and goes on elsewhere: pressures are smoothed on either side, never across. */
+struct stretch {
+    size_t block; /* first of its blocks .. */
+    size_t blocks;
+    size_t step; /* .. and of its steps */
+    size_t end_step;
+};
+
+/* The tip of the row in which a stretch starts is older than the row: its pressures count from a little before it. */
+static size_t first_step(const struct replay *replay, const struct replay_run *run, size_t index) {
+    if (index == 0) {
+        return 0;
+    }
+    const size_t row = run->run->break_row[index - 1], age = (size_t)(GAP_TIP_AGE_S * 1e6 / (double)replay->step_us) + 2;
+    const size_t at = run->row_step[row], before = run->row_step[row - 1];
+    return at - before > 2 * age ? at - age : before + (at - before + 1) / 2;
+}
+
+static struct stretch stretch_of(const struct replay *replay, const struct replay_run *run, size_t index) {
+    const size_t breaks = run->run->breaks;
+    struct stretch stretch = {.step = first_step(replay, run, index),
+                              .end_step = index < breaks ? first_step(replay, run, index + 1) : run->steps + 1};
+    stretch.block = index > 0 ? block_of_step(replay, run->row_step[run->run->break_row[index - 1]]) : 0;
+    const size_t end = index < breaks ? block_of_step(replay, run->row_step[run->run->break_row[index]]) : run->blocks;
+    stretch.blocks = end > stretch.block ? end - stretch.block : 1;
+    return stretch;
+}
+
 /* Without duties the readings are all there is: what the sensors would show of the present guess is taken off, and the
  * smoothed rest added, until the effects on the sensors have settled. Commanded pressures stand in where nothing was read. */
 static void guess_run(const struct replay *replay, const struct gap_model *model, size_t index, struct plant *plant,
@@ -483,9 +541,14 @@ static void guess_run(const struct replay *replay, const struct gap_model *model
                 observed[b] = walk->sum[3 * b + c];
                 variance[b] = run->variance[3 * b + c];
             }
-            if (smoother_run(&run->smoother[c], observed, variance, run->blocks, smoothed)) {
-                for (size_t step = 0; step <= run->steps; step++) {
-                    pressure_pa[3 * step + c] += between(smoothed, 1, run->blocks, block_position(replay, (double)step));
+            for (size_t i = 0; i <= run->run->breaks; i++) {
+                const struct stretch part = stretch_of(replay, run, i);
+                if (!smoother_run(&run->smoother[c], observed + part.block, variance + part.block, part.blocks, smoothed)) {
+                    continue;
+                }
+                for (size_t step = part.step; step < part.end_step; step++) {
+                    const double position = block_position(replay, (double)step) - (double)part.block;
+                    pressure_pa[3 * step + c] += between(smoothed, 1, part.blocks, position);
                 }
             }
         }
@@ -654,6 +717,22 @@ void replay_tip(const struct replay *replay, const struct gap_model *model, cons
 
 /* --- weights --- */
 
+/* How freely a pressure wanders is seen within stretches: the jumps between them are taken off. */
+static void level_stretches(const struct replay *replay, const struct replay_run *run, double *observed) {
+    for (size_t i = 0; i <= run->run->breaks && run->run->breaks > 0 && !run->run->has_duty; i++) {
+        const struct stretch part = stretch_of(replay, run, i);
+        double sum = 0.0, count = 0.0;
+        for (size_t b = part.block; b < part.block + part.blocks; b++) {
+            const bool seen = isfinite(observed[run->blocks + b]);
+            sum += seen ? observed[b] : 0.0;
+            count += seen;
+        }
+        for (size_t b = part.block; b < part.block + part.blocks && count > 0.0; b++) {
+            observed[b] -= sum / count;
+        }
+    }
+}
+
 static bool fit_smoothers(struct replay *replay, struct replay_state *state) {
     for (size_t i = 0; i < replay->runs; i++) {
         struct replay_run *run = &replay->run[i];
@@ -667,6 +746,7 @@ static bool fit_smoothers(struct replay *replay, struct replay_state *state) {
                 room[b] = state->difference[i][3 * b + c];
                 room[run->blocks + b] = run->variance[3 * b + c];
             }
+            level_stretches(replay, run, room);
             const bool rigid = replay->rigid && run->run->has_duty;
             if (!smoother_fit(&run->smoother[c], room, room + run->blocks, run->blocks, rigid, from_readings)) {
                 free(room);
@@ -733,6 +813,8 @@ static bool weigh_tip(struct replay *replay, const struct gap_model *model, cons
             const double variance = noise * noise / fmax((double)count, 1.0) + floor_of * floor_of +
                                     spread2[REPLAY_TIP_CHANNELS * b + k];
             replay->weight[run->tip_at + REPLAY_TIP_CHANNELS * b + k] = seen ? 1.0 / sqrt(variance) : 0.0;
+            replay->lasting[run->tip_at + REPLAY_TIP_CHANNELS * b + k] =
+                run->run->has_duty ? 0.0 : spread2[REPLAY_TIP_CHANNELS * b + k] / variance;
         }
     }
     free(mean);

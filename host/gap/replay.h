@@ -63,6 +63,8 @@ struct replay {
     double *weight;    /* [residuals] 1 / (noise of a block) */
     uint8_t *held_out; /* [residuals] 1: not used to fit */
     struct replay_elsewhere elsewhere;
+    double *lasting;   /* [residuals] share of a block's noise that its neighbours have too; see noise_floor.h */
+    uint8_t *apart;    /* [residuals] 1: its difference from the block before says nothing of the noise; see noise_floor.h */
 };
 
 /* What a replay of one model leaves behind; one for each thread. */

@@ -7,6 +7,8 @@
 #include "gap/baseline.h"
 #include "program/output_file.h"
 
+#define DEGREES (180.0 / M_PI)
+
 /* --- text --- */
 
 /* In the unit that people use: mm, deg, ms, kPa, ml. */
@@ -75,6 +77,38 @@ static void print_where(FILE *out, const struct diagnosis *diagnosis) {
     fprintf(out, ", %s\n", diagnosis->regime);
 }
 
+/* What comes nearest to an unknown gap, though it does not explain it. */
+static void print_closest(FILE *out, const struct diagnosis *diagnosis) {
+    for (size_t i = 0; i < diagnosis->closest; i++) {
+        const struct gap_model *model = &diagnosis->closest_model[i].model;
+        fprintf(out, "%-10s%3.0f %% closed by", i == 0 ? "closest" : "", 100.0 * diagnosis->closest_model[i].closed);
+        for (size_t e = 0; e < model->count; e++) {
+            const struct effect *effect = &model->effect[e];
+            if (gap_model_is_part(model, e)) {
+                continue;
+            }
+            fprintf(out, "%s%s", e > 0 ? " and " : " ", effect->kind->name);
+            if (effect->chamber > 0) {
+                fprintf(out, " of chamber %zu", effect->chamber);
+            }
+            for (size_t p = 0; p < effect->kind->parameter_count; p++) {
+                const char *unit = effect->kind->parameter[p].unit;
+                fprintf(out, "%s%s %.3g%s%s", p == 0 ? " (" : ", ", effect->kind->parameter[p].name, effect->parameter[p],
+                        strcmp(unit, "1") == 0 ? "" : " ", strcmp(unit, "1") == 0 ? "" : unit);
+            }
+            fprintf(out, ")");
+        }
+        fprintf(out, "\n");
+    }
+}
+
+/* "1.04 (0.91 to 1.2)" in a column of its own */
+static void print_rms(FILE *out, const struct diagnosis_gap *gap, size_t model, double value) {
+    char text[64];
+    (void)snprintf(text, sizeof text, "%.3g (%.3g to %.3g)", value, gap->low[model], gap->high[model]);
+    fprintf(out, "%-22s ", text);
+}
+
 void gap_report_text(const struct diagnosis *diagnosis, const struct gap_data *data, FILE *out) {
     print_verdict(out, diagnosis);
     print_where(out, diagnosis);
@@ -95,6 +129,7 @@ void gap_report_text(const struct diagnosis *diagnosis, const struct gap_data *d
     }
     if (diagnosis->verdict == GAP_UNKNOWN) {
         fprintf(out, "what      %s\n", diagnosis->description);
+        print_closest(out, diagnosis);
     }
     if (diagnosis->verdict != GAP_INSUFFICIENT_DATA) {
         fprintf(out, "nominal   stiffness x ");
@@ -106,14 +141,20 @@ void gap_report_text(const struct diagnosis *diagnosis, const struct gap_data *d
         fprintf(out, "\nhow far   %.0f %% of the gap closed (%.0f to %.0f %%); by recalibration alone %.0f %%\n",
                 100.0 * diagnosis->closed.value, 100.0 * diagnosis->closed.low, 100.0 * diagnosis->closed.high,
                 100.0 * diagnosis->closed_recalibration.value);
-        fprintf(out, "          on held-out data, rms       before   recalibrated   with effect    noise floor\n");
+        fprintf(out, "          on held-out data, rms  %-22s %-22s %-22s noise floor\n", "before", "recalibrated", "with effect");
     }
     for (size_t k = 0; k < DIAGNOSIS_RESIDUALS; k++) {
         const struct diagnosis_gap *gap = &diagnosis->gap[k];
         if (gap->measured) {
-            fprintf(out, "          %-20s %10.4g %14.4g %13.4g %14.4g %s\n", gap->name, gap->before,
-                    gap->after_recalibration, gap->after_effect, gap->floor, gap->unit);
+            fprintf(out, "          %-22s ", gap->name);
+            print_rms(out, gap, 0, gap->before);
+            print_rms(out, gap, 1, gap->after_recalibration);
+            print_rms(out, gap, 2, gap->after_effect);
+            fprintf(out, "%.3g %s\n", gap->floor, gap->unit);
         }
+    }
+    if (*diagnosis->direction.text != '\0') {
+        fprintf(out, "direction %s\n", diagnosis->direction.text);
     }
     if (*diagnosis->next_experiment != '\0') {
         fprintf(out, "next      %s\n", diagnosis->next_experiment);
@@ -176,16 +217,70 @@ static json_t *alternatives_json(const struct diagnosis *diagnosis) {
     return list;
 }
 
+static json_t *range_json(double low, double high) {
+    return json_pack("[o,o]", number_or_null(low), number_or_null(high));
+}
+
+static json_t *holds_json(const struct direction *direction, const struct gap_data *data) {
+    json_t *list = json_array();
+    for (size_t i = 0; i < direction->holds; i++) {
+        const struct direction_hold *hold = &direction->hold[i];
+        json_array_append_new(list, json_pack("{s:s,s:f,s:f,s:o,s:o,s:o,s:o,s:o}", "log", data->run[hold->run].path, "from_s",
+                                              hold->from_s, "until_s", hold->until_s, "bend_deg",
+                                              number_or_null(DEGREES * hold->bend_rad), "just_after_deg",
+                                              number_or_null(DEGREES * hold->just_after_rad), "end_deg",
+                                              number_or_null(DEGREES * hold->end_rad), "growth", number_or_null(hold->growth),
+                                              "time_constant_s", number_or_null(hold->time_constant_s)));
+    }
+    return list;
+}
+
+/* Measured minus simulated bend over holds; null where the logs have none. */
+static json_t *direction_json(const struct direction *direction, const struct gap_data *data) {
+    if (direction->holds == 0) {
+        return json_null();
+    }
+    return json_pack("{s:s,s:s,s:f,s:f,s:o,s:{s:o,s:o,s:o,s:s},s:o,s:o}", "text", direction->text, "bend_from",
+                     direction->from_orientation ? "orientation" : "position", "just_after_deg",
+                     DEGREES * direction->just_after_rad, "end_deg", DEGREES * direction->end_rad, "end_with_effects_deg",
+                     number_or_null(DEGREES * direction->end_with_effects_rad), "time_constant", "value",
+                     number_or_null(direction->time_constant_s), "low", number_or_null(direction->time_constant_low_s), "high",
+                     number_or_null(direction->time_constant_high_s), "unit", "s", "growth",
+                     range_json(direction->growth_low, direction->growth_high), "holds", holds_json(direction, data));
+}
+
+static json_t *closest_json(const struct diagnosis *diagnosis) {
+    json_t *list = json_array();
+    for (size_t i = 0; i < diagnosis->closest; i++) {
+        const struct gap_model *model = &diagnosis->closest_model[i].model;
+        json_t *effects = json_array();
+        for (size_t e = 0; e < model->count; e++) {
+            const struct effect *effect = &model->effect[e];
+            json_t *parameters = json_object();
+            for (size_t p = 0; p < effect->kind->parameter_count; p++) {
+                json_object_set_new(parameters, effect->kind->parameter[p].name, json_real(effect->parameter[p]));
+            }
+            json_array_append_new(effects, json_pack("{s:s,s:i,s:i,s:o}", "name", effect->kind->name, "form", (int)effect->form,
+                                                     "chamber", (int)effect->chamber, "parameters", parameters));
+        }
+        json_array_append_new(list, json_pack("{s:f,s:o}", "closed_fraction", diagnosis->closest_model[i].closed, "effects", effects));
+    }
+    return list;
+}
+
 static json_t *gaps_json(const struct diagnosis *diagnosis) {
     json_t *object = json_object();
     for (size_t k = 0; k < DIAGNOSIS_RESIDUALS; k++) {
         const struct diagnosis_gap *gap = &diagnosis->gap[k];
         if (gap->measured) {
             json_object_set_new(object, gap->name,
-                                json_pack("{s:o,s:o,s:o,s:o,s:s}", "before", number_or_null(gap->before),
+                                json_pack("{s:o,s:o,s:o,s:o,s:s,s:{s:o,s:o,s:o}}", "before", number_or_null(gap->before),
                                           "after_recalibration", number_or_null(gap->after_recalibration),
                                           "after_effect", number_or_null(gap->after_effect), "floor",
-                                          number_or_null(gap->floor), "unit", gap->unit));
+                                          number_or_null(gap->floor), "unit", gap->unit, "interval", "before",
+                                          range_json(gap->low[0], gap->high[0]), "after_recalibration",
+                                          range_json(gap->low[1], gap->high[1]), "after_effect",
+                                          range_json(gap->low[2], gap->high[2])));
         }
     }
     return object;
@@ -235,14 +330,15 @@ static json_t *report_json(const struct diagnosis *diagnosis, const struct gap_d
     }
     json_t *closed = interval_json(&diagnosis->closed, NULL);
     json_object_set_new(closed, "recalibration", json_real(diagnosis->closed_recalibration.value));
-    return json_pack("{s:s,s:o,s:s,s:{s:s,s:o,s:s},s:o,s:o,s:o,s:o,s:{s:o,s:o},s:o,s:o,s:s,s:s,s:o,s:o}", "verdict",
+    return json_pack("{s:s,s:o,s:s,s:{s:s,s:o,s:s},s:o,s:o,s:o,s:o,s:{s:o,s:o},s:o,s:o,s:o,s:o,s:s,s:s,s:o,s:o}", "verdict",
                      gap_verdict_name(diagnosis->verdict), "logs", logs, "module", data->module, "locus", "stage",
                      diagnosis->stage, "chambers", chambers, "regime", diagnosis->regime, "effects",
                      effects_json(diagnosis), "group", group, "dependence", dependences_json(&diagnosis->dependences), "structure",
                      json_pack("[f,f,f]", diagnosis->structure[0], diagnosis->structure[1], diagnosis->structure[2]), "nominal", "stiffness_scale",
                      interval_json(&diagnosis->stiffness_scale, "1"), "supply_scale",
                      interval_json(&diagnosis->supply_scale, "1"), "gap", gaps_json(diagnosis), "closed_fraction",
-                     closed, "description", diagnosis->description, "next_experiment", diagnosis->next_experiment,
+                     closed, "direction", direction_json(&diagnosis->direction, data), "closest", closest_json(diagnosis),
+                     "description", diagnosis->description, "next_experiment", diagnosis->next_experiment,
                      "warnings", warnings, "alternatives", alternatives_json(diagnosis));
 }
 

@@ -5,6 +5,7 @@
 
 #include "gap/report_markup.h"
 
+#define DEGREES (180.0 / M_PI)
 #define BAR_LEFT 4.0
 #define BAR_WIDTH 1054.0
 #define BAR_TOP 18.0
@@ -295,6 +296,31 @@ static void write_parts(FILE *out, const struct diagnosis *diagnosis, const stru
     }
 }
 
+static void write_closest(FILE *out, const struct diagnosis *diagnosis) {
+    if (diagnosis->closest == 0) {
+        return;
+    }
+    fputs("<p class=\"muted\">What comes nearest, and the share of the held-out gap that it closes:</p>\n<ul>\n", out);
+    for (size_t i = 0; i < diagnosis->closest; i++) {
+        const struct gap_model *model = &diagnosis->closest_model[i].model;
+        fputs("<li>", out);
+        markup_percent(out, diagnosis->closest_model[i].closed);
+        fputs(": ", out);
+        for (size_t e = 0; e < model->count; e++) {
+            if (gap_model_is_part(model, e)) {
+                continue;
+            }
+            fputs(e > 0 ? " and " : "", out);
+            markup_text(out, model->effect[e].kind->name);
+            fputs(" <span class=\"muted\">(", out);
+            markup_parameters(out, &model->effect[e]);
+            fputs(")</span>", out);
+        }
+        fputs("</li>\n", out);
+    }
+    fputs("</ul>\n", out);
+}
+
 static void write_which(FILE *out, const struct diagnosis *diagnosis, const struct search *search) {
     const bool shown = names_effects(diagnosis) || diagnosis->verdict == GAP_GROUP;
     fputs("<section><h3>Which <span class=\"muted\">(90\xc2\xa0% intervals)</span></h3>\n", out);
@@ -312,6 +338,7 @@ static void write_which(FILE *out, const struct diagnosis *diagnosis, const stru
         write_parts(out, diagnosis, &search->everything.model);
     } else {
         fputs("<p>No effect of the catalogue is named.</p>\n", out);
+        write_closest(out, diagnosis);
     }
     fputs("<div class=\"effect\"><p class=\"muted\">nominal parameters, refitted</p><table>\n", out);
     write_scale(out, "stiffness", &diagnosis->stiffness_scale);
@@ -437,8 +464,18 @@ static void write_number_cell(FILE *out, double value) {
     fputs("</td>", out);
 }
 
+static void write_rms_cell(FILE *out, const struct diagnosis_gap *gap, size_t model, double value) {
+    fputs("<td class=\"number\">", out);
+    markup_number(out, value, 0.0);
+    fputs("<br/><span class=\"muted\">", out);
+    markup_number(out, gap->low[model], 0.0);
+    fputs(" to ", out);
+    markup_number(out, gap->high[model], 0.0);
+    fputs("</span></td>", out);
+}
+
 static void write_gaps(FILE *out, const struct diagnosis *diagnosis) {
-    fputs("<div class=\"scroll\"><table>\n<tr><th>measured minus simulated, rms on held-out data</th>"
+    fputs("<div class=\"scroll\"><table>\n<tr><th>measured minus simulated, rms on held-out data; below it the 90\xc2\xa0% interval</th>"
           "<th class=\"number\"><span class=\"swatch before\"></span>before</th>"
           "<th class=\"number\"><span class=\"swatch recalibrated\"></span>recalibrated</th>"
           "<th class=\"number\"><span class=\"swatch after\"></span>after</th>"
@@ -450,9 +487,9 @@ static void write_gaps(FILE *out, const struct diagnosis *diagnosis) {
             fputs("<tr><td>", out);
             write_residual_name(out, gap->name);
             fputs("</td>", out);
-            write_number_cell(out, gap->before);
-            write_number_cell(out, gap->after_recalibration);
-            write_number_cell(out, gap->after_effect);
+            write_rms_cell(out, gap, 0, gap->before);
+            write_rms_cell(out, gap, 1, gap->after_recalibration);
+            write_rms_cell(out, gap, 2, gap->after_effect);
             write_number_cell(out, gap->floor);
             fprintf(out, "<td>%s</td><td>", gap->unit);
             draw_strip(out, gap);
@@ -460,6 +497,40 @@ static void write_gaps(FILE *out, const struct diagnosis *diagnosis) {
         }
     }
     fputs("</table></div>\n", out);
+}
+
+static void write_angle_cell(FILE *out, double angle_rad) {
+    fputs("<td class=\"number\">", out);
+    markup_number(out, angle_rad * DEGREES, 0.01);
+    fputs("</td>", out);
+}
+
+/* Which way the gap goes while a pressure is held. */
+static void write_direction(FILE *out, const struct diagnosis *diagnosis) {
+    const struct direction *direction = &diagnosis->direction;
+    if (direction->holds == 0) {
+        return;
+    }
+    fputs("<h3>Direction</h3>\n<p>", out);
+    markup_text(out, direction->text);
+    fputs(".</p>\n<details><summary>hold by hold</summary>\n<div class=\"scroll\"><table>\n<tr><th>run</th>"
+          "<th class=\"number\">from, s</th><th class=\"number\">until, s</th><th class=\"number\">bend, deg</th>"
+          "<th class=\"number\">measured minus nominal just after the step, deg</th><th class=\"number\">at its end, deg</th>"
+          "<th class=\"number\">bend changes by, %</th><th class=\"number\">time constant, s</th></tr>\n",
+          out);
+    for (size_t i = 0; i < direction->holds; i++) {
+        const struct direction_hold *hold = &direction->hold[i];
+        fprintf(out, "<tr><td>%zu</td>", hold->run + 1);
+        write_number_cell(out, hold->from_s);
+        write_number_cell(out, hold->until_s);
+        write_angle_cell(out, hold->bend_rad);
+        write_angle_cell(out, hold->just_after_rad);
+        write_angle_cell(out, hold->end_rad);
+        write_number_cell(out, 100.0 * hold->growth);
+        write_number_cell(out, hold->time_constant_s);
+        fputs("</tr>\n", out);
+    }
+    fputs("</table></div></details>\n", out);
 }
 
 void report_verdict(FILE *out, const struct diagnosis *diagnosis, const struct search *search) {
@@ -471,6 +542,7 @@ void report_verdict(FILE *out, const struct diagnosis *diagnosis, const struct s
     if (has_gap(diagnosis)) {
         write_closed(out, diagnosis);
         write_gaps(out, diagnosis);
+        write_direction(out, diagnosis);
     } else {
         fputs("<p>Nothing that was recorded can be held against the model.</p>\n", out);
     }
