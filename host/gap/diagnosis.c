@@ -769,6 +769,9 @@ static void decide(struct diagnosis *diagnosis, const struct search *search) {
     if (says_nothing(diagnosis, search)) {
         diagnosis->verdict = GAP_INSUFFICIENT_DATA;
         diagnosis->effects = 0;
+        diagnosis->group = 0;
+        diagnosis->stage = "";
+        memset(diagnosis->chamber, 0, sizeof diagnosis->chamber);
         return;
     }
     if (search->data->from_simulator && fmax(before, recalibrated) <= STRUCTURE_NONE) {

@@ -20,6 +20,7 @@
 #define POSITION_LEAST_M 2e-5
 #define ANGLE_LEAST_RAD (0.008 * M_PI / 180.0)
 #define NUDGE_PA 20.0
+#define TIMING_SHARE 0.998 /* of the jumps under the format's own timing, that another must leave fewer than */
 #define MAD_TO_SIGMA 1.4826
 #define UNCLIPPED 8        /* readings in a row without a zero: the chamber is under pressure */
 #define UNCLIPPED_LEAST 50 /* so many of them that their noise is known */
@@ -834,24 +835,33 @@ static void weigh_pressures(struct replay *replay, size_t index) {
     }
 }
 
+/* By how much the differences jump from block to block: a duty that counts a period too early or late shows there, and the slow
+ * errors of a model that lacks something do not. */
+static double jumps(const struct replay *replay, const struct replay_state *state) {
+    double sum = 0.0;
+    for (size_t i = 0; i < replay->runs; i++) {
+        const struct replay_run *run = &replay->run[i];
+        for (size_t k = 3; k < 3 * run->blocks && run->run->has_duty; k++) {
+            const bool seen = isfinite(run->variance[k]) && isfinite(run->variance[k - 3]);
+            sum += seen ? fabs(state->difference[i][k] - state->difference[i][k - 3]) : 0.0;
+        }
+    }
+    return sum;
+}
+
 /* Logs differ in whether the duty of a row that stands at a period's start is the one that this period has. Both are
- * tried on the nominal model; the first, which the run log's format means, unless the other fits clearly better. */
+ * tried on the nominal model; the first, which the run log's format means, unless the other fits better. */
 static void choose_duty_timing(struct replay *replay, const struct gap_model *model, struct replay_state *state) {
-    double cost[2] = {0.0, 0.0};
+    double cost[2];
     for (int late = 0; late < 2; late++) {
         for (size_t i = 0; i < replay->runs; i++) {
             replay->run[i].duty_from_next_period = late == 1;
         }
         replay_pressures(replay, model, state);
-        for (size_t i = 0; i < replay->runs; i++) {
-            const struct replay_run *run = &replay->run[i];
-            for (size_t k = 0; k < 3 * run->blocks && run->run->has_duty; k++) {
-                cost[late] += pow(state->difference[i][k] * replay->weight[run->pressure_at + k], 2.0);
-            }
-        }
+        cost[late] = jumps(replay, state);
     }
     for (size_t i = 0; i < replay->runs; i++) {
-        replay->run[i].duty_from_next_period = cost[1] < 0.98 * cost[0];
+        replay->run[i].duty_from_next_period = cost[1] < TIMING_SHARE * cost[0];
     }
 }
 

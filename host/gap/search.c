@@ -493,6 +493,25 @@ static bool recalibrate(struct search *search, struct fit *fit, bool fit_nominal
     return sound && (fit != &search->best || compare_again(search));
 }
 
+static bool is_later_form(const struct gap_model *model, size_t e) {
+    for (size_t i = 0; i < e; i++) {
+        if (model->effect[i].kind == model->effect[e].kind && model->effect[e].kind->forms_add) {
+            return true;
+        }
+    }
+    return false;
+}
+
+/* All forms of a kind whose forms add up set in together. */
+static void set_onset(struct gap_model *model, size_t e, double onset_s) {
+    const struct effect_kind *kind = model->effect[e].kind;
+    for (size_t i = 0; i < model->count; i++) {
+        if (i == e || (kind->forms_add && model->effect[i].kind == kind)) {
+            model->effect[i].onset_s = onset_s;
+        }
+    }
+}
+
 /* When did each effect set in? Tried on a grid, kept where it explains more. */
 static void find_onsets(struct search *search, struct crew *crew, struct fit *fit) {
     double end_s = 0.0;
@@ -501,7 +520,7 @@ static void find_onsets(struct search *search, struct crew *crew, struct fit *fi
         end_s = fmax(end_s, run->time_s[run->rows - 1]);
     }
     for (size_t e = 0; e < fit->model.count; e++) {
-        if (fit->model.effect[e].kind->forms_add) {
+        if (is_later_form(&fit->model, e)) {
             continue; /* its forms belong together */
         }
         struct fit trial[ONSETS];
@@ -509,7 +528,7 @@ static void find_onsets(struct search *search, struct crew *crew, struct fit *fi
 #pragma omp parallel for schedule(dynamic, 1) num_threads(crew->count)
         for (size_t k = 0; k < ONSETS; k++) {
             trial[k] = before;
-            trial[k].model.effect[e].onset_s = end_s * (double)(k + 1) / (ONSETS + 1.0);
+            set_onset(&trial[k].model, e, end_s * (double)(k + 1) / (ONSETS + 1.0));
             fitter_run(&crew->fitter[omp_get_thread_num()], &trial[k], 2, true);
         }
         double width_s = end_s / (ONSETS + 1.0);
@@ -529,8 +548,7 @@ static void find_onsets(struct search *search, struct crew *crew, struct fit *fi
 #pragma omp parallel for schedule(dynamic, 1) num_threads(crew->count)
             for (size_t k = 0; k < ONSETS; k++) {
                 trial[k] = centre;
-                trial[k].model.effect[e].onset_s =
-                    fmax(middle_s + width_s * (2.0 * (double)k / (ONSETS - 1.0) - 1.0), 0.0);
+                set_onset(&trial[k].model, e, fmax(middle_s + width_s * (2.0 * (double)k / (ONSETS - 1.0) - 1.0), 0.0));
                 fitter_run(&crew->fitter[omp_get_thread_num()], &trial[k], 1, true);
             }
             for (size_t k = 0; k < ONSETS; k++) {
