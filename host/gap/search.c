@@ -25,7 +25,9 @@
 #define REPEATS_CERTAIN 0.04  /* share of repeated samples that no noise makes */
 #define REPEATS_LEAST 0.02    /* share of repeated samples below which none is frozen */
 #define ONSETS 12
-#define ONSET_LEAVES 0.5
+#define ONSET_LEAVES 0.5      /* of the structure, at most */
+#define ONSET_ROUNDS 4
+#define UNEXPLAINED_SHARE 0.1 /* of the gap, that an effect without one may leave */
 #define LATE_SHARE 0.03       /* of the gap, that an effect with an onset may leave */
 #define ONSET_FINE_S 0.15     /* an onset is not sought closer than that */
 #define COMPLETING_SHARE 0.5  /* of what is left, that a further effect must explain */
@@ -513,50 +515,58 @@ static void set_onset(struct gap_model *model, size_t e, double onset_s) {
 }
 
 /* When did each effect set in? Tried on a grid, kept where it explains more. */
-static void find_onsets(struct search *search, struct crew *crew, struct fit *fit) {
-    double end_s = 0.0;
-    for (size_t i = 0; i < search->data->runs; i++) {
-        const struct gap_run *run = &search->data->run[i];
-        end_s = fmax(end_s, run->time_s[run->rows - 1]);
+static void find_onset(struct crew *crew, double end_s, size_t e, struct fit *fit) {
+    struct fit trial[ONSETS];
+    const struct fit before = *fit;
+#pragma omp parallel for schedule(dynamic, 1) num_threads(crew->count)
+    for (size_t k = 0; k < ONSETS; k++) {
+        trial[k] = before;
+        set_onset(&trial[k].model, e, end_s * (double)(k + 1) / (ONSETS + 1.0));
+        fitter_run(&crew->fitter[omp_get_thread_num()], &trial[k], ONSET_ROUNDS, true);
     }
-    for (size_t e = 0; e < fit->model.count; e++) {
-        if (is_later_form(&fit->model, e)) {
-            continue; /* its forms belong together */
+    for (double width_s = end_s / (ONSETS + 1.0); width_s > ONSET_FINE_S; width_s *= 0.4) {
+        size_t best = 0;
+        for (size_t k = 1; k < ONSETS; k++) {
+            best = held_out(&trial[k]) < held_out(&trial[best]) ? k : best;
         }
-        struct fit trial[ONSETS];
-        const struct fit before = *fit;
+        if (!is_better(fit, &trial[best])) {
+            break;
+        }
+        *fit = trial[best];
+        const struct fit centre = *fit;
+        const double middle_s = centre.model.effect[e].onset_s;
 #pragma omp parallel for schedule(dynamic, 1) num_threads(crew->count)
         for (size_t k = 0; k < ONSETS; k++) {
-            trial[k] = before;
-            set_onset(&trial[k].model, e, end_s * (double)(k + 1) / (ONSETS + 1.0));
-            fitter_run(&crew->fitter[omp_get_thread_num()], &trial[k], 2, true);
+            trial[k] = centre;
+            set_onset(&trial[k].model, e, fmax(middle_s + width_s * (2.0 * (double)k / (ONSETS - 1.0) - 1.0), 0.0));
+            fitter_run(&crew->fitter[omp_get_thread_num()], &trial[k], 1, true);
         }
-        double width_s = end_s / (ONSETS + 1.0);
-        while (width_s > ONSET_FINE_S) {
-            size_t best = 0;
-            for (size_t k = 1; k < ONSETS; k++) {
-                best = held_out(&trial[k]) < held_out(&trial[best]) ? k : best;
+        for (size_t k = 0; k < ONSETS; k++) {
+            if (held_out(&trial[k]) < held_out(fit)) {
+                *fit = trial[k];
             }
-            /* a real onset leaves little; a form that is somewhat off gains a little by any */
-            const bool first = fit->model.effect[e].onset_s == 0.0;
-            if (!is_better(fit, &trial[best]) || (first && structure(&trial[best]) > ONSET_LEAVES * structure(fit))) {
-                break;
-            }
-            *fit = trial[best];
-            const double middle_s = fit->model.effect[e].onset_s;
-            const struct fit centre = *fit;
-#pragma omp parallel for schedule(dynamic, 1) num_threads(crew->count)
-            for (size_t k = 0; k < ONSETS; k++) {
-                trial[k] = centre;
-                set_onset(&trial[k].model, e, fmax(middle_s + width_s * (2.0 * (double)k / (ONSETS - 1.0) - 1.0), 0.0));
-                fitter_run(&crew->fitter[omp_get_thread_num()], &trial[k], 1, true);
-            }
-            for (size_t k = 0; k < ONSETS; k++) {
-                if (held_out(&trial[k]) < held_out(fit)) {
-                    *fit = trial[k];
-                }
-            }
-            width_s *= 0.4;
+        }
+    }
+    /* a real onset leaves little; a form that is somewhat off gains a little by any */
+    if (before.model.effect[e].onset_s == 0.0 && structure(fit) > ONSET_LEAVES * structure(&before)) {
+        *fit = before;
+    }
+}
+
+/* To the end of the longest run. */
+static double longest_s(const struct gap_data *data) {
+    double end_s = 0.0;
+    for (size_t i = 0; i < data->runs; i++) {
+        end_s = fmax(end_s, data->run[i].time_s[data->run[i].rows - 1]);
+    }
+    return end_s;
+}
+
+static void find_onsets(struct search *search, struct crew *crew, struct fit *fit) {
+    const double end_s = longest_s(search->data);
+    for (size_t e = 0; e < fit->model.count && !stopped(search); e++) {
+        if (!is_later_form(&fit->model, e)) { /* its forms belong together */
+            find_onset(crew, end_s, e, fit);
         }
     }
 }
@@ -732,27 +742,42 @@ static bool take_repeats(struct search *search, size_t step) {
     return sound && recalibrate(search, &search->best, true);
 }
 
-/* An effect that sets in late is taken for another while candidates act from the start. Where one was found to set in late and
- * leaves much, all are tried again from its onset on. */
-static bool search_after_onset(struct search *search, struct workspace *room) {
-    const struct fit before = search->best;
-    const double left = structure(&before) / fmax(structure(&search->recalibrated), STRUCTURE_LEAST);
-    const bool late = before.model.count > 0 && before.model.effect[0].onset_s > 0.0;
-    if (!late || left < LATE_SHARE || structure(&before) < STRUCTURE_LEAST || stopped(search)) {
-        return true;
-    }
-    search->onset_s = before.model.effect[0].onset_s;
+/* What the best model leaves of the gap. */
+static double share_left(const struct search *search) {
+    return structure(&search->best) / fmax(structure(&search->recalibrated), STRUCTURE_LEAST);
+}
+
+/* All candidates once more, from that time on; better than `least`, and the best becomes it. */
+static void try_from(struct search *search, struct workspace *room, double onset_s, struct fit *least) {
+    search->onset_s = onset_s;
     search->best = search->recalibrated;
     room->singles = 0;
-    const bool found = add_one(search, room, 0);
-    search->onset_s = 0.0;
-    bool sound = true;
-    if (found) {
-        sound = recalibrate(search, &search->best, true);
+    if (add_one(search, room, 0) && held_out(&search->best) < held_out(least)) {
+        *least = search->best;
     }
-    if (!found || structure(&search->best) > left * fmax(structure(&search->recalibrated), STRUCTURE_LEAST)) {
+    search->onset_s = 0.0;
+}
+
+/* An effect that sets in late is taken for another while candidates act from the start. Where much is left, all are tried
+ * again from the onset that was found, or where none was, from a third and from two thirds of the recording on. */
+static bool search_after_onset(struct search *search, struct workspace *room) {
+    const struct fit before = search->best;
+    const double left = share_left(search);
+    const bool late = before.model.effect[0].onset_s > 0.0;
+    if (left < (late ? LATE_SHARE : UNEXPLAINED_SHARE) || structure(&before) < STRUCTURE_LEAST || stopped(search)) {
+        return true;
+    }
+    bool sound = recalibrate(search, &search->recalibrated, true);
+    struct fit least = search->recalibrated;
+    const double end_s = longest_s(search->data);
+    for (size_t i = 0; i < (late ? 1 : 2) && sound && !stopped(search); i++) {
+        try_from(search, room, late ? before.model.effect[0].onset_s : end_s * (double)(i + 1) / 3.0, &least);
+    }
+    search->best = least;
+    sound = sound && least.model.count > 0 && recalibrate(search, &search->best, true);
+    if (!sound || share_left(search) > left) {
         search->best = before;
-        sound = sound && recalibrate(search, &search->best, true);
+        sound = recalibrate(search, &search->best, true);
     }
     return sound;
 }
