@@ -524,7 +524,8 @@ static void find_onset(struct crew *crew, double end_s, size_t e, struct fit *fi
         set_onset(&trial[k].model, e, end_s * (double)(k + 1) / (ONSETS + 1.0));
         fitter_run(&crew->fitter[omp_get_thread_num()], &trial[k], ONSET_ROUNDS, true);
     }
-    for (double width_s = end_s / (ONSETS + 1.0); width_s > ONSET_FINE_S; width_s *= 0.4) {
+    double width_s = end_s / (ONSETS + 1.0);
+    while (width_s > ONSET_FINE_S) {
         size_t best = 0;
         for (size_t k = 1; k < ONSETS; k++) {
             best = held_out(&trial[k]) < held_out(&trial[best]) ? k : best;
@@ -546,6 +547,7 @@ static void find_onset(struct crew *crew, double end_s, size_t e, struct fit *fi
                 *fit = trial[k];
             }
         }
+        width_s *= 0.4;
     }
     /* a real onset leaves little; a form that is somewhat off gains a little by any */
     if (before.model.effect[e].onset_s == 0.0 && structure(fit) > ONSET_LEAVES * structure(&before)) {
