@@ -47,6 +47,11 @@ void bus_options_init(struct bus_options *options);
 /* argp's key for every argument of ours that is a quantity: parse or say what was expected. */
 void cli_quantity(struct argp_state *state, const char *what, int kind, const char *text, double *value);
 
+/* A whole number, or a message that names the option and its bounds. */
+int cli_whole_number(struct argp_state *state, const char *option, const char *text, int least, int most);
+/* Worker threads of --threads. */
+int cli_threads(struct argp_state *state, const char *text);
+
 /* A controller that is reached, and the table that goes with it. */
 struct bus {
     struct table_file file;

@@ -78,10 +78,7 @@ static error_t parse(int key, char *argument, struct argp_state *state) {
         parse_without(state, argument, arguments);
         return 0;
     case 'T':
-        arguments->threads = atoi(argument);
-        if (arguments->threads < 1 || arguments->threads > 1024) {
-            argp_error(state, "--threads: '%s' is not a number from 1 to 1024", argument);
-        }
+        arguments->threads = cli_threads(state, argument);
         return 0;
     case 'b':
         arguments->own_baseline = strcmp(argument, "table") == 0;

@@ -7,7 +7,7 @@
 
 #include "cli/commands.h"
 #include "gap/close.h"
-#include "program/output_file.h"
+#include "gap/report_file.h"
 
 #define DEGREES (180.0 / M_PI)
 #define SEEDS_DEFAULT 5
@@ -30,15 +30,6 @@ static const struct argp_option option_list[] = {
     {"quiet", 'q', NULL, 0, "no summary", 0},
     {0}};
 
-static void parse_seeds(struct argp_state *state, const char *text, struct arguments *arguments) {
-    char *end = NULL;
-    const unsigned long seeds = strtoul(text, &end, 10);
-    if (end == text || *end != '\0' || seeds < 1 || seeds > CLOSE_SEEDS_MAX) {
-        argp_error(state, "--seeds: '%s' is not a whole number from 1 to %d", text, CLOSE_SEEDS_MAX);
-    }
-    arguments->seeds = seeds;
-}
-
 static error_t parse(int key, char *argument, struct argp_state *state) {
     struct arguments *arguments = state->input;
     switch (key) {
@@ -49,7 +40,7 @@ static error_t parse(int key, char *argument, struct argp_state *state) {
         arguments->table = argument;
         return 0;
     case 's':
-        parse_seeds(state, argument, arguments);
+        arguments->seeds = (size_t)cli_whole_number(state, "--seeds", argument, 1, CLOSE_SEEDS_MAX);
         return 0;
     case 'j':
         arguments->json = argument;
@@ -249,22 +240,8 @@ static json_t *report_json(const struct arguments *arguments, const struct close
 
 static int write_json(const struct arguments *arguments, json_t *report) {
     char error[PROGRAM_ERROR_BYTES];
-    struct output_file file;
-    if (report == NULL) {
-        return program_fail(EXIT_OUTPUT, "%s: the report could not be put together", arguments->json);
-    }
-    if (!output_file_open(&file, arguments->json, error, sizeof error)) {
-        json_decref(report);
-        return program_fail(EXIT_OUTPUT, "%s", error);
-    }
-    const int status = json_dumpf(report, file.stream, JSON_INDENT(2) | JSON_REAL_PRECISION(8));
-    fputc('\n', file.stream);
-    json_decref(report);
-    if (status != 0) {
-        output_file_discard(&file);
-        return program_fail(EXIT_OUTPUT, "%s: the report could not be written", arguments->json);
-    }
-    return output_file_commit(&file, error, sizeof error) ? EXIT_OK : program_fail(EXIT_OUTPUT, "%s", error);
+    const bool written = report_file_write(report, arguments->json, error, sizeof error);
+    return written ? EXIT_OK : program_fail(EXIT_OUTPUT, "%s", error);
 }
 
 /* --- the course of it --- */

@@ -60,13 +60,6 @@ static void parse_group(struct argp_state *state, struct arguments *arguments, c
     }
 }
 
-static void parse_threads(struct argp_state *state, struct arguments *arguments, const char *text) {
-    arguments->threads = atoi(text);
-    if (arguments->threads < 1 || arguments->threads > 1024) {
-        argp_error(state, "--threads: '%s' is not a number from 1 to 1024", text);
-    }
-}
-
 static void check_whole(struct argp_state *state, const struct arguments *arguments) {
     if (arguments->report == NULL && arguments->candidates == 0) {
         argp_error(
@@ -102,7 +95,7 @@ static error_t parse(int key, char *argument, struct argp_state *state) {
         arguments->json = argument;
         return 0;
     case 'T':
-        parse_threads(state, arguments, argument);
+        arguments->threads = cli_threads(state, argument);
         return 0;
     case 'q':
         arguments->quiet = true;

@@ -47,15 +47,6 @@ static void choose(struct argp_state *state, struct arguments *arguments, enum i
     arguments->format = format;
 }
 
-static void parse_node(struct argp_state *state, const char *text, struct arguments *arguments) {
-    char *end = NULL;
-    const long node = strtol(text, &end, 10);
-    if (end == text || *end != '\0' || node < 0 || node > NODE_MOST) {
-        argp_error(state, "--node: '%s' is not a whole number from 0 to %d", text, NODE_MOST);
-    }
-    arguments->node = (int)node;
-}
-
 static void parse_setting(struct argp_state *state, char *text, struct arguments *arguments) {
     char error[PROGRAM_ERROR_BYTES + 1024];
     char *equals = strchr(text, '=');
@@ -99,7 +90,7 @@ static error_t parse(int key, char *argument, struct argp_state *state) {
         choose(state, arguments, FORMAT_CANDUMP);
         return 0;
     case 'n':
-        parse_node(state, argument, arguments);
+        arguments->node = cli_whole_number(state, "--node", argument, 0, NODE_MOST);
         return 0;
     case 's':
         parse_setting(state, argument, arguments);

@@ -8,6 +8,7 @@
 #include "units/units.h"
 
 #define REFERENCE_TABLE "tables/paper-semicircle.tbt"
+#define THREADS_MOST 1024
 #define DURATION_MOST_S 86400.0
 
 static const struct argp_option option_list[] = {
@@ -29,6 +30,20 @@ void cli_quantity(struct argp_state *state, const char *what, int kind, const ch
     if (!units_parse((enum units_kind)kind, text, value, error, sizeof error)) {
         argp_error(state, "%s: %s", what, error);
     }
+}
+
+int cli_whole_number(struct argp_state *state, const char *option, const char *text, int least, int most) {
+    char *end = NULL;
+    const long number = strtol(text, &end, 10);
+    if (end == text || *end != '\0' || number < least || number > most) {
+        argp_error(state, "%s: '%s' is not a whole number from %d to %d", option, text, least, most);
+        return least;
+    }
+    return (int)number;
+}
+
+int cli_threads(struct argp_state *state, const char *text) {
+    return cli_whole_number(state, "--threads", text, 1, THREADS_MOST);
 }
 
 static void parse_duration(struct argp_state *state, const char *text, struct bus_options *options) {

@@ -4,7 +4,7 @@
 #include <math.h>
 #include <string.h>
 
-#include "program/output_file.h"
+#include "gap/report_file.h"
 
 #define DEGREES (180.0 / M_PI)
 #define INSEPARABLE                                                                                          \
@@ -179,23 +179,5 @@ static json_t *report_json(const struct plan_search *search, const struct plan_c
 
 bool plan_report_json(const struct plan_search *search, const struct plan_candidates *candidates,
                       const char *plan_path, const char *path, char *error, size_t error_bytes) {
-    struct output_file file;
-    json_t *report = report_json(search, candidates, plan_path);
-    if (report == NULL) {
-        (void)snprintf(error, error_bytes, "%s: the report could not be put together", path);
-        return false;
-    }
-    if (!output_file_open(&file, path, error, error_bytes)) {
-        json_decref(report);
-        return false;
-    }
-    const int status = json_dumpf(report, file.stream, JSON_INDENT(2) | JSON_REAL_PRECISION(8));
-    fputc('\n', file.stream);
-    json_decref(report);
-    if (status != 0) {
-        output_file_discard(&file);
-        (void)snprintf(error, error_bytes, "%s: the report could not be written", path);
-        return false;
-    }
-    return output_file_commit(&file, error, error_bytes);
+    return report_file_write(report_json(search, candidates, plan_path), path, error, error_bytes);
 }

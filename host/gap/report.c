@@ -5,6 +5,7 @@
 #include <string.h>
 
 #include "gap/baseline.h"
+#include "gap/report_file.h"
 #include "program/output_file.h"
 
 #define DEGREES (180.0 / M_PI)
@@ -344,27 +345,12 @@ static json_t *report_json(const struct diagnosis *diagnosis, const struct gap_d
 
 bool gap_report_json(const struct diagnosis *diagnosis, const struct gap_data *data, const char *path, char *error,
                      size_t error_bytes) {
-    struct output_file file;
     json_t *report = report_json(diagnosis, data);
-    if (report == NULL) {
-        (void)snprintf(error, error_bytes, "%s: the report could not be put together", path);
-        return false;
+    if (report != NULL) {
+        json_object_set_new(report, "baseline", json_string(data->from_simulator ? "simulator" : "table"));
+        json_object_set_new(report, "not_tried", untried_json(data));
     }
-    json_object_set_new(report, "baseline", json_string(data->from_simulator ? "simulator" : "table"));
-    json_object_set_new(report, "not_tried", untried_json(data));
-    if (!output_file_open(&file, path, error, error_bytes)) {
-        json_decref(report);
-        return false;
-    }
-    const int status = json_dumpf(report, file.stream, JSON_INDENT(2) | JSON_REAL_PRECISION(8));
-    fputc('\n', file.stream);
-    json_decref(report);
-    if (status != 0) {
-        output_file_discard(&file);
-        (void)snprintf(error, error_bytes, "%s: the report could not be written", path);
-        return false;
-    }
-    return output_file_commit(&file, error, error_bytes);
+    return report_file_write(report, path, error, error_bytes);
 }
 
 /* --- calibration --- */

@@ -158,6 +158,7 @@ log() { # NAME AWK_STATEMENT: the good log with its rows changed
     awk -F, "BEGIN { OFS = \",\" } /^#/ || /^time/ { print; next } { n++; $2; print }" "$scratch/good.csv" >"$scratch/$1.csv"
     echo "$scratch/$1.csv"
 }
+expect threads_with_a_tail 2 "4abc. is not a whole number from 1 to 1024" "$tribend" gap diagnose -q -T 4abc "$(log tail 1)"
 expect log_in_bar 3 'looks like bar' "$tribend" gap diagnose -q "$(log bar 'for (i = 8; i <= 10; i++) $i = $i / 1e5')"
 scale() { log "$1" "for (i = $2; i <= $3; i++) if (\$i != \"\") \$i = \$i * $4"; } # NAME FIRST_COLUMN LAST FACTOR
 blank() { log "$1" "for (i = $2; i <= $3; i++) \$i = \"\"; for (i = $4; i <= $5; i++) \$i = \$i * $6"; }
