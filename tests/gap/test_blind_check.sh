@@ -3,17 +3,7 @@
 build=${TRIBEND_BUILD:-build}
 scratch=$(mktemp -d)
 trap 'rm -rf "$scratch"' EXIT
-passed=0 failed=0
-check() { # name, condition's status
-    echo "[ RUN      ] $1"
-    if [ "$2" -eq 0 ]; then
-        echo "[       OK ] $1"
-        passed=$((passed + 1))
-    else
-        echo "[  FAILED  ] $1"
-        failed=$((failed + 1))
-    fi
-}
+. tests/support/check.sh
 export SMALL=1 STRICT=1 BUILD=$build
 tests/gap/blind/gap_check "$scratch/work" >"$scratch/said" 2>&1
 code=$?
@@ -43,5 +33,4 @@ diff "$scratch/work/score.txt" "$scratch/ranks/score.txt" && diff -r "$scratch/w
 check two_ranks_give_the_same_score $?
 [ -s "$scratch/kept" ] && find "$scratch/ranks/answers" -name '*.json' -printf '%f %T@\n' | grep -qxF -f "$scratch/kept"
 check finished_cases_are_not_diagnosed_again $?
-echo "[  PASSED  ] $passed test(s)."
-[ "$failed" -eq 0 ]
+check_end

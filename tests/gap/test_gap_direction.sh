@@ -8,18 +8,8 @@ out=$(mktemp -d)
 trap 'rm -rf "$out"' EXIT
 TRIBEND_TABLE=$PWD/tables/paper-semicircle.tbt
 export TRIBEND_TABLE
-passed=0 failed=0
-check() { # name, condition's status
-    echo "[ RUN      ] $1"
-    if [ "$2" -eq 0 ]; then
-        echo "[       OK ] $1"
-        passed=$((passed + 1))
-    else
-        cat "$out"/*.txt
-        echo "[  FAILED  ] $1"
-        failed=$((failed + 1))
-    fi
-}
+. tests/support/check.sh
+shown="$out/*.txt"
 holds() { # condition on numbers, for awk
     awk "BEGIN {exit !($1)}"
 }
@@ -102,5 +92,4 @@ floor=$(awk '/^ +r2_angle/ {gsub(/\([^)]*\)/, ""); print $5}' "$out/cut.txt")
 holds "$(awk '/^ +r2_angle/ {gsub(/\([^)]*\)/, ""); print $4}' "$out/unmarked.txt") > 1.3 * $(awk '/^ +r2_angle/ {gsub(/\([^)]*\)/, ""); print $4}' "$out/cut.txt")"
 check segments_are_read $?
 echo "           floor of the cut recording: $floor deg"
-echo "[  PASSED  ] $passed test(s)."
-[ "$failed" -eq 0 ]
+check_end

@@ -4,18 +4,8 @@
 scratch=$(mktemp -d)
 trap 'rm -rf "$scratch"' EXIT
 build=$scratch/build
-passed=0 failed=0
-check() { # name, condition's status
-    echo "[ RUN      ] $1"
-    if [ "$2" -eq 0 ]; then
-        echo "[       OK ] $1"
-        passed=$((passed + 1))
-    else
-        cat "$scratch/said"
-        echo "[  FAILED  ] $1"
-        failed=$((failed + 1))
-    fi
-}
+. tests/support/check.sh
+shown=$scratch/said
 cp docs/examples/joint_slack.c "$scratch/joint_slack.c"
 make -s -j2 BUILD="$build" EXTRA_EFFECTS="$scratch/joint_slack.c" "$build/tribend" >"$scratch/said" 2>&1
 check one_file_is_built_in $?
@@ -32,5 +22,4 @@ check it_is_found_where_it_is $?
 "$build/tribend" bend 55deg --toward 20deg --for 8s -q --record "$scratch/plain.csv" >"$scratch/said" 2>&1
 "$build/tribend" gap diagnose "$scratch/plain.csv" >"$scratch/said" 2>&1 && ! grep -q 'joint_slack' "$scratch/said"
 check and_only_there $?
-echo "[  PASSED  ] $passed test(s)."
-[ "$failed" -eq 0 ]
+check_end

@@ -18,18 +18,8 @@ for file in kcl_stiff_flop/NoLoad.csv kcl_stiff_flop/Load1.csv eth_sopra_steps/4
 done
 out=$(mktemp -d)
 trap 'rm -rf "$out"' EXIT
-passed=0 failed=0
-check() { # name, condition's status
-    echo "[ RUN      ] $1"
-    if [ "$2" -eq 0 ]; then
-        echo "[       OK ] $1"
-        passed=$((passed + 1))
-    else
-        cat "$out/said"
-        echo "[  FAILED  ] $1"
-        failed=$((failed + 1))
-    fi
-}
+. tests/support/check.sh
+shown=$out/said
 # A number of the text report. `figure REPORT RESIDUAL N`: the N-th of before, recalibrated, with effect, or floor (4).
 figure() {
     sed -n "s/^ *$2 \{1,\}//p" "$out/$1.txt" | sed -E 's/ \([^)]*\)//g' | awk -v n="$3" '{print $n}'
@@ -82,5 +72,4 @@ holds "$(figure eth-steps r2_position 4) > 0.02 && $(figure eth-steps r2_positio
 check the_floor_of_markers_is_that_of_their_notes $?
 grep '^direction' "$out/eth-steps.txt" | grep -q '8 holds.*goes on bending'
 check every_step_creeps $?
-echo "[  PASSED  ] $passed test(s)."
-[ "$failed" -eq 0 ]
+check_end
