@@ -3,13 +3,16 @@
 JOBS := $(shell nproc 2>/dev/null || echo 1)
 
 BUILD_PACKAGES := gcc libc6-dev pkg-config libgmsh-dev libsuitesparse-dev libgsl-dev libcyaml-dev libyaml-dev \
-                  libopenmpi-dev openmpi-bin zlib1g-dev libjansson-dev libcmocka-dev calculix-ccx gnuplot-nox fonts-dejavu-core
+                  libopenmpi-dev openmpi-bin zlib1g-dev libjansson-dev libcmocka-dev calculix-ccx gnuplot-nox fonts-dejavu-core \
+                  $(EMULATOR_PACKAGES)
+EMULATOR_PACKAGES := libunicorn-dev qemu-system-arm gcc-arm-none-eabi
 LINT_PACKAGES  := clang clang-tidy cppcheck gcc-arm-none-eabi libnewlib-arm-none-eabi
 
 # --- sources: a folder is a layer; arrows between layers are include paths below
 FIRMWARE_C := $(wildcard firmware/*.c firmware/*/*.c)
 # EXTRA_EFFECTS=FILE.c: effects of one's own, from anywhere, built into the simulator and the diagnosis
 SIM_C      := $(wildcard hal/sim/*.c hal/sim/effects/*.c) $(EXTRA_EFFECTS)
+EMULATOR_C := $(wildcard hal/emulator/*.c)
 MODEL_C    := $(filter-out model/cli/%,$(wildcard model/*/*.c))
 SHARED_C    := $(wildcard model/units/*.c model/program/*.c) model/description/yaml_file.c model/description/calibration_file.c
 TABLES_CLI_C := $(wildcard model/cli/*.c)
@@ -23,7 +26,7 @@ BLIND_SCORE_C := $(wildcard tests/gap/blind/blind_score*.c)
 SHARE_C := $(wildcard tests/gap/share/*.c)
 BLIND_MAIN := tests/gap/blind/blind_generate.c
 BLIND_C    := $(filter-out $(BLIND_SCORE_C) $(BLIND_MAIN),$(wildcard tests/gap/blind/blind_*.c))
-ALL_C      := $(wildcard docs/examples/*.c) $(FIRMWARE_C) $(SIM_C) $(MODEL_C) $(TABLES_CLI_C) $(HOST_C) $(HOST_MAIN) $(TEST_C) $(BENCH_C) $(SUPPORT_C) $(SOLID_C) $(BLIND_C) $(BLIND_MAIN) $(BLIND_SCORE_C) $(SHARE_C)
+ALL_C      := $(wildcard docs/examples/*.c) $(FIRMWARE_C) $(SIM_C) $(EMULATOR_C) $(MODEL_C) $(TABLES_CLI_C) $(HOST_C) $(HOST_MAIN) $(TEST_C) $(BENCH_C) $(SUPPORT_C) $(SOLID_C) $(BLIND_C) $(BLIND_MAIN) $(BLIND_SCORE_C) $(SHARE_C)
 ALL_H      := $(wildcard tests/gap/blind/*.h tests/model/ccx/*.h firmware/*.h firmware/*/*.h hal/*.h hal/*/*.h model/*/*.h host/*/*.h tests/*/*.h)
 
 # --- flags
@@ -43,6 +46,7 @@ MODEL_FLAGS    := $(COMMON_FLAGS) -fopenmp $(MPI_FLAGS)
 object = $(patsubst %.c,$(BUILD)/%.o,$(1))
 FIRMWARE_O := $(call object,$(FIRMWARE_C))
 SIM_O      := $(call object,$(SIM_C))
+EMULATOR_O := $(call object,$(EMULATOR_C))
 MODEL_O    := $(call object,$(MODEL_C))
 SHARED_O    := $(call object,$(SHARED_C))
 TABLES_CLI_O := $(call object,$(TABLES_CLI_C))
@@ -52,9 +56,11 @@ SUPPORT_O  := $(call object,$(SUPPORT_C))
 PROGRAMS := $(BUILD)/tribend-tables $(BUILD)/tribend
 TEST_PROGRAMS  := $(patsubst %.c,$(BUILD)/%,$(TEST_C))
 BLIND_PROGRAMS := $(BUILD)/tests/gap/blind/blind_generate $(BUILD)/tests/gap/blind/blind_score $(BUILD)/tests/gap/share/gap_share
+# the emulated core's own test program
+SELFTEST_ELF := $(BUILD)/tests/hil/selftest.elf
 BENCH_PROGRAMS := $(patsubst %.c,$(BUILD)/%,$(BENCH_C))
 
-HOST_LIBS  := -ljansson -lcyaml -lyaml -fopenmp -lm
+HOST_LIBS  := -ljansson -lcyaml -lyaml -lunicorn -fopenmp -lm
 MODEL_LIBS := $(shell pkg-config --libs mpi-c 2>/dev/null) -lgmsh -lcholmod -lgsl -lgslcblas -lcyaml -lyaml -lz -fopenmp -lm
 
 # V=1 shows the commands in full.
@@ -80,11 +86,11 @@ link = $(if $(V),,@echo '  link $@';) $(CC) $(SANITIZE_FLAGS) $(filter %.o,$^) -
 
 $(BUILD)/tribend-tables: $(TABLES_CLI_O) $(MODEL_O) $(FIRMWARE_O)
 	$(link) $(MODEL_LIBS)
-$(BUILD)/tribend: $(call object,$(HOST_MAIN)) $(HOST_O) $(SIM_O) $(FIRMWARE_O) $(SHARED_O)
+$(BUILD)/tribend: $(call object,$(HOST_MAIN)) $(HOST_O) $(EMULATOR_O) $(SIM_O) $(FIRMWARE_O) $(SHARED_O)
 	$(link) $(HOST_LIBS)
 
 .PHONY: test-programs bench-programs
-test-programs: $(TEST_PROGRAMS) $(BLIND_PROGRAMS)
+test-programs: $(TEST_PROGRAMS) $(BLIND_PROGRAMS) $(SELFTEST_ELF)
 bench-programs: $(BENCH_PROGRAMS)
 
 # Tests of the model link its libraries; the others link what `tribend` links.
@@ -102,8 +108,13 @@ $(BUILD)/tests/gap/blind/blind_score: $(call object,$(BLIND_SCORE_C))
 $(BUILD)/tests/gap/share/gap_share: $(call object,$(SHARE_C) $(wildcard model/sweep/*.c))
 	$(link) $(shell pkg-config --libs mpi-c 2>/dev/null) -lz -fopenmp
 $(BUILD)/tests/gap/test_blind_plant: $(call object,$(filter-out %/blind_truth.c,$(BLIND_C)))
-$(BUILD)/tests/%: $(BUILD)/tests/%.o $(SUPPORT_O) $(HOST_O) $(SIM_O) $(FIRMWARE_O) $(SHARED_O)
+$(BUILD)/tests/%: $(BUILD)/tests/%.o $(SUPPORT_O) $(HOST_O) $(EMULATOR_O) $(SIM_O) $(FIRMWARE_O) $(SHARED_O)
 	$(link) -lcmocka $(HOST_LIBS)
+
+$(SELFTEST_ELF): tests/hil/selftest/selftest.c tests/hil/selftest/selftest.ld
+	@mkdir -p $(@D)
+	$(if $(V),,@echo '  link $@';) arm-none-eabi-gcc -mcpu=cortex-m4 -mthumb -mfloat-abi=hard -mfpu=fpv4-sp-d16 -O2 -g -std=gnu11 \
+	    $(WARNINGS) $(EXACT) -ffreestanding -nostdlib -T tests/hil/selftest/selftest.ld $< -o $@
 
 .SECONDARY:
 -include $(patsubst %.c,$(BUILD)/%.d,$(ALL_C))
@@ -124,10 +135,10 @@ lint-clang:
 	@set -e; for f in $(HOST_SIDE_C); do clang -O1 $(COMMON_FLAGS) $(MPI_FLAGS) -Wno-unknown-pragmas -Wno-source-uses-openmp \
 	    -fopenmp -fsyntax-only $$f; done
 lint-cppcheck:
-	@cppcheck -j$(JOBS) $(CPPCHECK_FLAGS) $(FIRMWARE_C) $(SIM_C) $(MODEL_C) $(TABLES_CLI_C) $(HOST_C) $(HOST_MAIN)
+	@cppcheck -j$(JOBS) $(CPPCHECK_FLAGS) $(FIRMWARE_C) $(SIM_C) $(EMULATOR_C) $(MODEL_C) $(TABLES_CLI_C) $(HOST_C) $(HOST_MAIN)
 # one file at a time: with several, clang-tidy 14 takes every va_list for uninitialised
 tidy = printf '%s\n' $(1) | xargs -P $(JOBS) -I FILE clang-tidy --quiet FILE -- $(2) 2>/dev/null
 lint-tidy:
 	@$(call tidy,$(FIRMWARE_C),$(FIRMWARE_FLAGS))
-	@$(call tidy,$(SIM_C) $(MODEL_C) $(TABLES_CLI_C) $(HOST_C) $(HOST_MAIN),$(COMMON_FLAGS) $(MPI_FLAGS) \
+	@$(call tidy,$(SIM_C) $(EMULATOR_C) $(MODEL_C) $(TABLES_CLI_C) $(HOST_C) $(HOST_MAIN),$(COMMON_FLAGS) $(MPI_FLAGS) \
 	    -Wno-unknown-pragmas -Wno-source-uses-openmp)
