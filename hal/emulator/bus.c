@@ -112,7 +112,7 @@ static int64_t fd_ticks(const struct bus_frame *frame, int64_t bit_ticks, int64_
     const uint32_t crc = frame->frame.length > 16u ? 21u : 17u;
     const int64_t before = switched + stuffed(&row, 0u, switched);
     const int64_t after =
-        row.count - switched + stuffed(&row, switched, row.count) + 4u + crc + 1u + (4u + crc + 3u) / 4u;
+        row.count - switched + stuffed(&row, switched, row.count) + 4u + crc + 1u + (4u + crc) / 4u;
     return (before + TAIL_BITS) * bit_ticks + after * (frame->rate_switch ? data_bit_ticks : bit_ticks);
 }
 
