@@ -168,6 +168,7 @@ static void load_from_flash(void *context, uint32_t address) {
 /* --- reset --- */
 
 static void reset(struct board *board, uint32_t cause) {
+    board->last_cause = cause;
     core_reset(&board->core);
     power_reset(&board->power);
     flash_reset(&board->flash);
@@ -240,7 +241,7 @@ static bool make_parts(struct board *board) {
     adc_init(&board->adc, core);
     usart_init(&board->usart, core, 39u);
     watchdog_init(&board->watchdog, core);
-    bus_init(&board->bus, &core->schedule, &core->now_ticks);
+    can_bus_init(&board->bus, &core->schedule, &core->now_ticks);
     fdcan_init(&board->fdcan, core, &board->bus);
     return can_host_join(&board->host, &board->bus) && flash_init(&board->flash, core);
 }

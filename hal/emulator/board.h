@@ -7,7 +7,7 @@
 #define TRIBEND_EMULATOR_BOARD_H
 
 #include "emulator/adc.h"
-#include "emulator/bus.h"
+#include "emulator/can_bus.h"
 #include "emulator/can_host.h"
 #include "emulator/core.h"
 #include "emulator/fdcan.h"
@@ -49,14 +49,15 @@ struct board {
     struct adc adc;
     struct usart usart;
     struct watchdog watchdog;
-    struct bus bus;
+    struct can_bus bus;
     struct fdcan fdcan;
     struct can_host host; /* the script's or socket's own node */
     struct wiring wiring;
     struct board_oddities oddities;
-    uint32_t resets; /* after the first start */
-    uint32_t reset_cause;
-    bool power_lost; /* by a cut within a flash operation */
+    uint32_t resets;      /* after the first start */
+    uint32_t reset_cause; /* asked for */
+    uint32_t last_cause;  /* of the last start */
+    bool power_lost;      /* by a cut within a flash operation */
     char elf[BOARD_PATH_BYTES];
 };
 

@@ -4,7 +4,7 @@
 
 #include "emulator/core.h"
 
-static bool node_wants(void *context, struct bus_frame *frame) {
+static bool node_wants(void *context, struct can_bus_frame *frame) {
     const struct can_host *host = context;
     if (host->waiting_count > 0) {
         *frame = host->waiting[host->first_waiting];
@@ -22,7 +22,7 @@ static void node_sent(void *context) {
     }
 }
 
-static void node_received(void *context, const struct bus_frame *frame) {
+static void node_received(void *context, const struct can_bus_frame *frame) {
     struct can_host *host = context;
     if (host->heard_count == CAN_HOST_RING) {
         host->first_heard = (host->first_heard + 1u) % CAN_HOST_RING;
@@ -41,18 +41,18 @@ static void node_changed(void *context) {
     host->node.online = true;
 }
 
-bool can_host_join(struct can_host *host, struct bus *bus) {
+bool can_host_join(struct can_host *host, struct can_bus *bus) {
     memset(host, 0, sizeof *host);
     host->bus = bus;
-    host->node = (struct bus_node){.context = host,
-                                   .wants = node_wants,
-                                   .sent = node_sent,
-                                   .received = node_received,
-                                   .changed = node_changed,
-                                   .bit_ticks = TICKS_PER_SECOND / 1000000,
-                                   .data_bit_ticks = TICKS_PER_SECOND / 5000000,
-                                   .online = true};
-    return bus_join(bus, &host->node);
+    host->node = (struct can_bus_node){.context = host,
+                                       .wants = node_wants,
+                                       .sent = node_sent,
+                                       .received = node_received,
+                                       .changed = node_changed,
+                                       .bit_ticks = TICKS_PER_SECOND / 1000000,
+                                       .data_bit_ticks = TICKS_PER_SECOND / 5000000,
+                                       .online = true};
+    return can_bus_join(bus, &host->node);
 }
 
 bool can_host_send(struct can_host *host, const struct hal_can_frame *frame) {
@@ -61,8 +61,8 @@ bool can_host_send(struct can_host *host, const struct hal_can_frame *frame) {
         return false;
     }
     host->waiting[(host->first_waiting + host->waiting_count++) % CAN_HOST_RING] =
-        (struct bus_frame){.frame = *frame, .rate_switch = frame->fd};
-    bus_attend(host->bus);
+        (struct can_bus_frame){.frame = *frame, .rate_switch = frame->fd};
+    can_bus_attend(host->bus);
     return true;
 }
 
@@ -79,7 +79,7 @@ bool can_host_receive(struct can_host *host, struct can_host_heard *heard) {
 void can_host_flood(struct can_host *host, const struct hal_can_frame *frame) {
     host->floods = frame != NULL;
     if (frame != NULL) {
-        host->flood = (struct bus_frame){.frame = *frame, .rate_switch = frame->fd};
+        host->flood = (struct can_bus_frame){.frame = *frame, .rate_switch = frame->fd};
     }
-    bus_attend(host->bus);
+    can_bus_attend(host->bus);
 }

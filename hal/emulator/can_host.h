@@ -3,7 +3,7 @@
 #ifndef TRIBEND_EMULATOR_CAN_HOST_H
 #define TRIBEND_EMULATOR_CAN_HOST_H
 
-#include "emulator/bus.h"
+#include "emulator/can_bus.h"
 
 #define CAN_HOST_RING 1024u
 
@@ -13,19 +13,19 @@ struct can_host_heard {
 };
 
 struct can_host {
-    struct bus *bus;
-    struct bus_node node;
-    struct bus_frame waiting[CAN_HOST_RING];
+    struct can_bus *bus;
+    struct can_bus_node node;
+    struct can_bus_frame waiting[CAN_HOST_RING];
     size_t first_waiting, waiting_count;
     struct can_host_heard heard[CAN_HOST_RING];
     size_t first_heard, heard_count;
     bool floods; /* sends `flood` whenever the bus is free */
-    struct bus_frame flood;
+    struct can_bus_frame flood;
     uint64_t heard_lost, refused; /* nobody took them in time; no room to send */
 };
 
 /* 1 Mbit/s, data of FD frames at 5 Mbit/s. False: no room on the bus. */
-bool can_host_join(struct can_host *host, struct bus *bus);
+bool can_host_join(struct can_host *host, struct can_bus *bus);
 /* False: no room. */
 bool can_host_send(struct can_host *host, const struct hal_can_frame *frame);
 /* The oldest frame heard; false: none. */

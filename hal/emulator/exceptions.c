@@ -3,8 +3,9 @@
 #define CONTROL_NPRIV 1u
 #define CONTROL_SPSEL 2u
 #define CONTROL_FPCA 4u
-#define CONTROL_SFPA 8u /* libunicorn's core is an M33 in its secure state, where FPCA alone is not enough   \
-                         */
+#define CONTROL_SFPA                                                                                         \
+    8u /* libunicorn's core is an M33 in its secure state, where FPCA alone is not enough                    \
+        */
 #define CCR_STKALIGN 0x200u
 #define XPSR_THUMB (1u << 24)
 #define XPSR_ALIGNED (1u << 9)

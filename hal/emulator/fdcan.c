@@ -94,7 +94,8 @@ static bool first_request(const struct fdcan *fdcan, uint32_t *which) {
     return found;
 }
 
-static void element_to_frame(const struct fdcan *fdcan, const uint32_t *element, struct bus_frame *frame) {
+static void element_to_frame(const struct fdcan *fdcan, const uint32_t *element,
+                             struct can_bus_frame *frame) {
     const bool extended = (element[0] & ID_EXTENDED) != 0;
     const bool fd = (fdcan->control & CCCR_FDOE) != 0 && (element[1] & CONTROL_FD) != 0;
     const uint8_t length = length_of_code[element[1] >> 16 & 15u];
@@ -108,7 +109,7 @@ static void element_to_frame(const struct fdcan *fdcan, const uint32_t *element,
     memcpy(frame->frame.data, &element[2], frame->frame.length);
 }
 
-static bool node_wants(void *context, struct bus_frame *frame) {
+static bool node_wants(void *context, struct can_bus_frame *frame) {
     struct fdcan *fdcan = context;
     uint32_t which = 0;
     if (!first_request(fdcan, &which)) {
@@ -182,7 +183,7 @@ static uint32_t code_of_length(uint32_t length) {
     return code;
 }
 
-static void store(struct fdcan *fdcan, uint32_t fifo, uint32_t filter, const struct bus_frame *frame) {
+static void store(struct fdcan *fdcan, uint32_t fifo, uint32_t filter, const struct can_bus_frame *frame) {
     const uint32_t put = (fdcan->receive_get[fifo] + fdcan->receive_fill[fifo]) % FDCAN_FIFO;
     uint32_t *element = &fdcan->memory[RECEIVE_WORD + (FDCAN_FIFO * fifo + put) * ELEMENT_WORDS];
     const uint32_t shift = 3u * fifo; /* RF1's flags follow RF0's */
@@ -202,7 +203,7 @@ static void store(struct fdcan *fdcan, uint32_t fifo, uint32_t filter, const str
     raise(fdcan, (IR_RF0N | (fdcan->receive_fill[fifo] == FDCAN_FIFO ? IR_RF0F : 0u)) << shift);
 }
 
-static void node_received(void *context, const struct bus_frame *frame) {
+static void node_received(void *context, const struct can_bus_frame *frame) {
     struct fdcan *fdcan = context;
     const bool rejects_remote = (fdcan->filters & (frame->frame.extended ? 1u : 2u)) != 0;
     uint32_t filter = UINT32_MAX;
@@ -220,16 +221,16 @@ static void node_received(void *context, const struct bus_frame *frame) {
 
 /* --- states and errors --- */
 
-static bool is_passive(const struct bus_node *node) {
+static bool is_passive(const struct can_bus_node *node) {
     return node->transmit_errors >= PASSIVE_AT || node->receive_errors >= PASSIVE_AT;
 }
 
-static bool is_warned(const struct bus_node *node) {
+static bool is_warned(const struct can_bus_node *node) {
     return node->transmit_errors >= WARNING_AT || node->receive_errors >= WARNING_AT;
 }
 
 static uint32_t status_bits(const struct fdcan *fdcan) {
-    const struct bus_node *node = &fdcan->node;
+    const struct can_bus_node *node = &fdcan->node;
     return (is_passive(node) && !node->bus_off ? PSR_EP : 0u) | (is_warned(node) ? PSR_EW : 0u) |
            (node->bus_off ? PSR_BO : 0u);
 }
@@ -274,20 +275,20 @@ static void write_control(struct fdcan *fdcan, uint32_t value) {
         fdcan->node.recovery = 0u;
     } else if (!init && was_init) {
         set_rates(fdcan);
-        bus_start_node(fdcan->bus, &fdcan->node);
+        can_bus_start_node(fdcan->bus, &fdcan->node);
     }
 }
 
-void fdcan_init(struct fdcan *fdcan, struct core *core, struct bus *bus) {
+void fdcan_init(struct fdcan *fdcan, struct core *core, struct can_bus *bus) {
     memset(fdcan, 0, sizeof *fdcan);
     fdcan->core = core;
     fdcan->bus = bus;
-    fdcan->node = (struct bus_node){.context = fdcan,
-                                    .wants = node_wants,
-                                    .sent = node_sent,
-                                    .received = node_received,
-                                    .changed = node_changed};
-    (void)bus_join(bus, &fdcan->node);
+    fdcan->node = (struct can_bus_node){.context = fdcan,
+                                        .wants = node_wants,
+                                        .sent = node_sent,
+                                        .received = node_received,
+                                        .changed = node_changed};
+    (void)can_bus_join(bus, &fdcan->node);
 }
 
 void fdcan_reset(struct fdcan *fdcan, uint32_t clock_hz) {
@@ -328,7 +329,7 @@ static uint32_t read_protocol_status(struct fdcan *fdcan) {
 }
 
 static uint32_t read_error_counters(struct fdcan *fdcan) {
-    const struct bus_node *node = &fdcan->node;
+    const struct can_bus_node *node = &fdcan->node;
     const uint32_t transmit = node->transmit_errors > 255u ? 255u : node->transmit_errors;
     const uint32_t receive = node->receive_errors > 127u ? 127u : node->receive_errors;
     const uint32_t value = transmit | receive << 8 | (node->receive_errors >= PASSIVE_AT ? 1u << 15 : 0u) |
@@ -452,7 +453,7 @@ static void request(struct fdcan *fdcan, uint32_t bits) {
     fdcan->requests |= bits;
     fdcan->transmitted &= ~bits;
     fdcan->cancelled &= ~bits;
-    bus_attend(fdcan->bus);
+    can_bus_attend(fdcan->bus);
 }
 
 /* A frame on the wire goes on to its end; what waits is dropped at once. */

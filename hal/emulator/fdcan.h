@@ -5,7 +5,7 @@
 #ifndef TRIBEND_EMULATOR_FDCAN_H
 #define TRIBEND_EMULATOR_FDCAN_H
 
-#include "emulator/bus.h"
+#include "emulator/can_bus.h"
 #include "emulator/core.h"
 
 #define FDCAN_MEMORY_WORDS 212u
@@ -13,8 +13,8 @@
 
 struct fdcan {
     struct core *core;
-    struct bus *bus;
-    struct bus_node node;
+    struct can_bus *bus;
+    struct can_bus_node node;
     uint32_t clock_hz;
     uint32_t memory[FDCAN_MEMORY_WORDS];
     uint32_t data_timing, control, nominal_timing, delay, interrupts, enables, line_select, lines, filters,
@@ -25,13 +25,13 @@ struct fdcan {
     uint32_t last_error, error_log;
     uint32_t plain[2]; /* TEST, RAM watchdog: kept, without effect */
     /* A frame left for, or came from, the bus. For records. */
-    void (*sent)(void *context, const struct bus_frame *frame);
-    void (*received)(void *context, const struct bus_frame *frame);
+    void (*sent)(void *context, const struct can_bus_frame *frame);
+    void (*received)(void *context, const struct can_bus_frame *frame);
     void *context;
     uint32_t lost, filtered;
 };
 
-void fdcan_init(struct fdcan *fdcan, struct core *core, struct bus *bus);
+void fdcan_init(struct fdcan *fdcan, struct core *core, struct can_bus *bus);
 void fdcan_reset(struct fdcan *fdcan, uint32_t clock_hz);
 void fdcan_clock(struct fdcan *fdcan, uint32_t clock_hz);
 bool fdcan_read(void *context, uint32_t offset, uint32_t *value);

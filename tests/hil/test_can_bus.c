@@ -1,5 +1,5 @@
-/* The virtual CAN bus and the FDCAN in front of it, driven through their registers without a program: frame lengths, arbitration,
- * acknowledgement, error counters, bus-off and recovery, filters and FIFOs. */
+/* The virtual CAN bus and the FDCAN in front of it, driven through their registers without a program: frame
+ * lengths, arbitration, acknowledgement, error counters, bus-off and recovery, filters and FIFOs. */
 #include "emulator/can_host.h"
 #include "emulator/fdcan.h"
 #include "support/test.h"
@@ -25,7 +25,7 @@
 #define PSR_BO (1u << 7)
 
 static struct core core;
-static struct bus bus;
+static struct can_bus bus;
 static struct fdcan fdcan;
 static struct can_host host, other;
 
@@ -45,7 +45,8 @@ static int close_core(void **state) {
 static void pass(int64_t ticks) {
     const int64_t until = core.now_ticks + ticks;
     while (core.schedule.next_ticks <= until) {
-        core.now_ticks = core.schedule.next_ticks > core.now_ticks ? core.schedule.next_ticks : core.now_ticks;
+        core.now_ticks =
+            core.schedule.next_ticks > core.now_ticks ? core.schedule.next_ticks : core.now_ticks;
         schedule_run(&core.schedule, core.now_ticks);
     }
     core.now_ticks = until;
@@ -78,7 +79,7 @@ static int begin(void **state) {
     (void)state;
     core.now_ticks = 0;
     schedule_init(&core.schedule, &core.deadline_ticks);
-    bus_init(&bus, &core.schedule, &core.now_ticks);
+    can_bus_init(&bus, &core.schedule, &core.now_ticks);
     fdcan_init(&fdcan, &core, &bus);
     fdcan_reset(&fdcan, 170000000u);
     start();
@@ -102,27 +103,29 @@ static uint32_t transmit(uint32_t id, uint32_t word) {
 /* --- lengths, by hand --- */
 
 static void frames_are_as_long_as_iso_has_them(void **state) {
-    struct bus_frame frame = {.frame = {.id = 0, .length = 0}};
+    struct can_bus_frame frame = {.frame = {.id = 0, .length = 0}};
     (void)state;
     /* 34 dominant bits with their CRC, 6 stuff bits, 10 of the tail */
-    assert_int_equal(bus_frame_ticks(&frame, BIT, BIT) / BIT, 50);
+    assert_int_equal(can_bus_frame_ticks(&frame, BIT, BIT) / BIT, 50);
     frame.frame.fd = true;
-    /* 14 dominant bits, FDF, 7 dominant: 22 and 3 stuff bits; stuff count 4, CRC 17, 6 fixed stuff bits; 10 of the tail */
-    assert_int_equal(bus_frame_ticks(&frame, BIT, BIT) / BIT, 62);
+    /* 14 dominant bits, FDF, 7 dominant: 22 and 3 stuff bits; stuff count 4, CRC 17, 6 fixed stuff bits; 10
+     * of the tail */
+    assert_int_equal(can_bus_frame_ticks(&frame, BIT, BIT) / BIT, 62);
     frame.rate_switch = true;
     /* from ESI on at five times the rate: 5 bits with their stuff bit, and the CRC's 27 */
-    assert_int_equal(bus_frame_ticks(&frame, 5 * BIT, BIT) / BIT, (17 + 2 + 10) * 5 + 5 + 1 + 27);
+    assert_int_equal(can_bus_frame_ticks(&frame, 5 * BIT, BIT) / BIT, (17 + 2 + 10) * 5 + 5 + 1 + 27);
 }
 
 static void no_frame_is_longer_than_its_worst_case(void **state) {
     int64_t longest = 0, shortest = INT64_MAX;
     (void)state;
     for (uint32_t i = 0; i < 2000; i++) {
-        struct bus_frame frame = {.frame = {.id = i % 0x800u, .length = 8}};
+        struct can_bus_frame frame = {.frame = {.id = i % 0x800u, .length = 8}};
         for (uint32_t k = 0; k < 8; k++) {
-            frame.frame.data[k] = i % 2u == 0 ? (uint8_t)(i / 256u * 0xffu) : (uint8_t)(i * 2654435761u >> (3u * k));
+            frame.frame.data[k] =
+                i % 2u == 0 ? (uint8_t)(i / 256u * 0xffu) : (uint8_t)(i * 2654435761u >> (3u * k));
         }
-        const int64_t bits = bus_frame_ticks(&frame, 1, 1);
+        const int64_t bits = can_bus_frame_ticks(&frame, 1, 1);
         longest = bits > longest ? bits : longest;
         shortest = bits < shortest ? bits : shortest;
     }
@@ -278,7 +281,7 @@ static void a_shorted_bus_drives_it_off_and_it_comes_back(void **state) {
     struct can_host_heard heard;
     (void)state;
     assert_true(can_host_join(&host, &bus));
-    bus_set_wire(&bus, BUS_SHORTED);
+    can_bus_set_wire(&bus, CAN_BUS_SHORTED);
     (void)transmit(0x123, 0);
     pass(5000 * BIT);
     assert_int_equal(fdcan.node.error_frames, 32); /* 32 x 8 = 256 */
@@ -288,7 +291,7 @@ static void a_shorted_bus_drives_it_off_and_it_comes_back(void **state) {
     set(CCCR, get(CCCR) & ~1u);
     pass(100000 * BIT);
     assert_int_equal(get(PSR) & PSR_BO, PSR_BO); /* no recessive bit to be seen */
-    bus_set_wire(&bus, BUS_SOUND);
+    can_bus_set_wire(&bus, CAN_BUS_SOUND);
     pass((128 * 11 - 1) * BIT);
     assert_int_equal(get(PSR) & PSR_BO, PSR_BO);
     pass(2 * BIT);
@@ -302,10 +305,10 @@ static void a_shorted_bus_drives_it_off_and_it_comes_back(void **state) {
 static void it_comes_back_on_a_busy_bus(void **state) {
     (void)state;
     assert_true(can_host_join(&host, &bus) && can_host_join(&other, &bus));
-    bus_set_wire(&bus, BUS_SHORTED);
+    can_bus_set_wire(&bus, CAN_BUS_SHORTED);
     (void)transmit(0x123, 0);
     pass(5000 * BIT);
-    bus_set_wire(&bus, BUS_SOUND);
+    can_bus_set_wire(&bus, CAN_BUS_SOUND);
     const struct hal_can_frame flood = frame_of(0x010, 8);
     can_host_flood(&other, &flood);
     set(CCCR, get(CCCR) & ~1u);

@@ -1,4 +1,4 @@
-#include "emulator/bus.h"
+#include "emulator/can_bus.h"
 
 #include <string.h>
 
@@ -68,7 +68,7 @@ static uint32_t length_code(uint32_t length) {
     return code;
 }
 
-static void put_identifier(struct bit_row *row, const struct bus_frame *frame) {
+static void put_identifier(struct bit_row *row, const struct can_bus_frame *frame) {
     const struct hal_can_frame *can = &frame->frame;
     put(row, 0u, 1); /* start of frame */
     if (can->extended) {
@@ -82,13 +82,13 @@ static void put_identifier(struct bit_row *row, const struct bus_frame *frame) {
     }
 }
 
-static void put_data(struct bit_row *row, const struct bus_frame *frame) {
+static void put_data(struct bit_row *row, const struct can_bus_frame *frame) {
     for (uint32_t i = 0; !frame->remote && i < frame->frame.length; i++) {
         put(row, frame->frame.data[i], 8);
     }
 }
 
-static int64_t classic_ticks(const struct bus_frame *frame, int64_t bit_ticks) {
+static int64_t classic_ticks(const struct can_bus_frame *frame, int64_t bit_ticks) {
     struct bit_row row = {.count = 0};
     put_identifier(&row, frame);
     put(&row, 0u, frame->frame.extended ? 2 : 1); /* reserved */
@@ -100,7 +100,7 @@ static int64_t classic_ticks(const struct bus_frame *frame, int64_t bit_ticks) {
 
 /* The CRC of FD frames has fixed stuff bits, one before it and one after each four bits, and a stuff count of
  * 4 bits. */
-static int64_t fd_ticks(const struct bus_frame *frame, int64_t bit_ticks, int64_t data_bit_ticks) {
+static int64_t fd_ticks(const struct can_bus_frame *frame, int64_t bit_ticks, int64_t data_bit_ticks) {
     struct bit_row row = {.count = 0};
     put_identifier(&row, frame);
     put(&row, 2u, 2);                           /* FDF, reserved */
@@ -116,24 +116,24 @@ static int64_t fd_ticks(const struct bus_frame *frame, int64_t bit_ticks, int64_
     return (before + TAIL_BITS) * bit_ticks + after * (frame->rate_switch ? data_bit_ticks : bit_ticks);
 }
 
-int64_t bus_frame_ticks(const struct bus_frame *frame, int64_t bit_ticks, int64_t data_bit_ticks) {
+int64_t can_bus_frame_ticks(const struct can_bus_frame *frame, int64_t bit_ticks, int64_t data_bit_ticks) {
     return frame->frame.fd ? fd_ticks(frame, bit_ticks, data_bit_ticks) : classic_ticks(frame, bit_ticks);
 }
 
 /* --- error counters, ISO 11898-1, 12.1.4 --- */
 
-static bool is_passive(const struct bus_node *node) {
+static bool is_passive(const struct can_bus_node *node) {
     return node->transmit_errors >= PASSIVE_AT || node->receive_errors >= PASSIVE_AT;
 }
 
-static void tell(struct bus_node *node, uint8_t error) {
+static void tell(struct can_bus_node *node, uint8_t error) {
     node->last_error = error;
     if (node->changed != NULL) {
         node->changed(node->context);
     }
 }
 
-static void fail_sender(struct bus *bus, struct bus_node *node, uint8_t error) {
+static void fail_sender(struct can_bus *bus, struct can_bus_node *node, uint8_t error) {
     /* An error-passive node that is alone with its frame keeps its count (exception 1 of rule c). */
     node->transmit_errors += error == ERROR_ACK && is_passive(node) ? 0u : 8u;
     node->error_frames++;
@@ -146,13 +146,13 @@ static void fail_sender(struct bus *bus, struct bus_node *node, uint8_t error) {
     tell(node, error);
 }
 
-static void fail_receiver(struct bus_node *node, uint32_t by, uint8_t error) {
+static void fail_receiver(struct can_bus_node *node, uint32_t by, uint8_t error) {
     node->receive_errors = node->receive_errors + by > 135u ? 135u : node->receive_errors + by;
     node->error_frames++;
     tell(node, error);
 }
 
-static void succeed(struct bus *bus, struct bus_node *node, bool sender) {
+static void succeed(struct can_bus *bus, struct can_bus_node *node, bool sender) {
     uint32_t *count = sender ? &node->transmit_errors : &node->receive_errors;
     const bool was_passive = is_passive(node);
     if (!sender && *count > PASSIVE_AT - 1u) {
@@ -170,23 +170,24 @@ static void succeed(struct bus *bus, struct bus_node *node, bool sender) {
 
 /* --- the wire --- */
 
-static bool hears(const struct bus *bus, const struct bus_node *a, const struct bus_node *b) {
-    return bus->wire == BUS_SOUND || (bus->wire == BUS_OPEN && (a == bus->node[0]) == (b == bus->node[0]));
+static bool hears(const struct can_bus *bus, const struct can_bus_node *a, const struct can_bus_node *b) {
+    return bus->wire == CAN_BUS_SOUND ||
+           (bus->wire == CAN_BUS_OPEN && (a == bus->node[0]) == (b == bus->node[0]));
 }
 
 /* Lower wins: 11 bits of the identifier, then standard before extended. */
-static uint64_t rank(const struct bus_frame *frame) {
+static uint64_t rank(const struct can_bus_frame *frame) {
     const uint64_t id = frame->frame.id;
     const uint64_t base = frame->frame.extended ? id >> 18 : id;
     return base << 32 | (frame->frame.extended ? 1u : 0u) << 31 |
            (frame->frame.extended ? id & 0x3ffffu : 0u) << 1 | (frame->remote ? 1u : 0u);
 }
 
-static bool choose(struct bus *bus) {
+static bool choose(struct can_bus *bus) {
     bus->sender = NULL;
     for (size_t i = 0; i < bus->nodes; i++) {
-        struct bus_node *node = bus->node[i];
-        struct bus_frame frame;
+        struct can_bus_node *node = bus->node[i];
+        struct can_bus_frame frame;
         if (!node->online || node->listens_only || node->recovery > 0u ||
             node->not_before_ticks > *bus->now_ticks || !node->wants(node->context, &frame)) {
             continue;
@@ -199,7 +200,8 @@ static bool choose(struct bus *bus) {
     return bus->sender != NULL;
 }
 
-static bool same_rate(const struct bus_node *a, const struct bus_node *b, const struct bus_frame *frame) {
+static bool same_rate(const struct can_bus_node *a, const struct can_bus_node *b,
+                      const struct can_bus_frame *frame) {
     const int64_t off =
         a->bit_ticks > b->bit_ticks ? a->bit_ticks - b->bit_ticks : b->bit_ticks - a->bit_ticks;
     const int64_t data_off = a->data_bit_ticks > b->data_bit_ticks ? a->data_bit_ticks - b->data_bit_ticks
@@ -208,22 +210,22 @@ static bool same_rate(const struct bus_node *a, const struct bus_node *b, const 
            (!frame->frame.fd || !frame->rate_switch || data_off * 100 <= a->data_bit_ticks);
 }
 
-static void start(struct bus *bus) {
-    const struct bus_node *sender = bus->sender;
-    const int64_t length = bus_frame_ticks(&bus->frame, sender->bit_ticks, sender->data_bit_ticks);
+static void start(struct can_bus *bus) {
+    const struct can_bus_node *sender = bus->sender;
+    const int64_t length = can_bus_frame_ticks(&bus->frame, sender->bit_ticks, sender->data_bit_ticks);
     bus->started_ticks = *bus->now_ticks;
     /* On a shorted wire the very first recessive bit of the identifier reads dominant. */
     schedule_set(bus->schedule, bus->slot,
-                 *bus->now_ticks + (bus->wire == BUS_SHORTED ? 2 * sender->bit_ticks : length));
+                 *bus->now_ticks + (bus->wire == CAN_BUS_SHORTED ? 2 * sender->bit_ticks : length));
 }
 
 /* When a node that has to wait may go on. */
-static int64_t next_wait(const struct bus *bus) {
+static int64_t next_wait(const struct can_bus *bus) {
     int64_t next = SCHEDULE_NEVER;
     for (size_t i = 0; i < bus->nodes; i++) {
-        const struct bus_node *node = bus->node[i];
+        const struct can_bus_node *node = bus->node[i];
         int64_t at = SCHEDULE_NEVER;
-        if (node->recovery > 0u && bus->wire != BUS_SHORTED) {
+        if (node->recovery > 0u && bus->wire != CAN_BUS_SHORTED) {
             at = bus->idle_ticks + RECESSIVE_RUN_BITS * node->bit_ticks;
         } else if (node->online && node->not_before_ticks > *bus->now_ticks) {
             at = node->not_before_ticks;
@@ -233,7 +235,7 @@ static int64_t next_wait(const struct bus *bus) {
     return next;
 }
 
-void bus_attend(struct bus *bus) {
+void can_bus_attend(struct can_bus *bus) {
     if (bus->sender != NULL) {
         return;
     }
@@ -247,9 +249,9 @@ void bus_attend(struct bus *bus) {
 }
 
 /* Eleven recessive bits have gone by, at the end of a frame or in an idle bus. */
-static void recessive_run(struct bus *bus) {
-    for (size_t i = 0; i < bus->nodes && bus->wire != BUS_SHORTED; i++) {
-        struct bus_node *node = bus->node[i];
+static void recessive_run(struct can_bus *bus) {
+    for (size_t i = 0; i < bus->nodes && bus->wire != CAN_BUS_SHORTED; i++) {
+        struct can_bus_node *node = bus->node[i];
         if (node->recovery > 0u && --node->recovery == 0u) {
             const bool was_off = node->bus_off;
             node->bus_off = false;
@@ -263,7 +265,7 @@ static void recessive_run(struct bus *bus) {
 }
 
 static void on_idle(void *context, int64_t at_ticks) {
-    struct bus *bus = context;
+    struct can_bus *bus = context;
     bool waits = false;
     for (size_t i = 0; i < bus->nodes; i++) {
         waits = waits || (bus->node[i]->recovery > 0u &&
@@ -273,14 +275,14 @@ static void on_idle(void *context, int64_t at_ticks) {
         bus->idle_ticks = at_ticks; /* the next run starts here */
         recessive_run(bus);
     }
-    bus_attend(bus);
+    can_bus_attend(bus);
 }
 
 /* The frame came to nothing: everybody has seen an error frame. */
-static void fail(struct bus *bus, struct bus_node *sender, uint8_t error) {
+static void fail(struct can_bus *bus, struct can_bus_node *sender, uint8_t error) {
     bus->errors++;
     for (size_t i = 0; i < bus->nodes; i++) {
-        struct bus_node *node = bus->node[i];
+        struct can_bus_node *node = bus->node[i];
         if (node != sender && node->online && hears(bus, sender, node) && error != ERROR_ACK) {
             fail_receiver(node, 1u, error == ERROR_BIT_0 ? ERROR_STUFF : ERROR_CRC);
         }
@@ -289,13 +291,13 @@ static void fail(struct bus *bus, struct bus_node *sender, uint8_t error) {
 }
 
 /* What goes wrong with the frame on the wire; NO_ERROR: nothing. */
-static uint8_t judge(struct bus *bus, const struct bus_node *sender) {
+static uint8_t judge(struct can_bus *bus, const struct can_bus_node *sender) {
     bool acknowledged = false;
-    if (bus->wire == BUS_SHORTED) {
+    if (bus->wire == CAN_BUS_SHORTED) {
         return ERROR_BIT_0;
     }
     for (size_t i = 0; i < bus->nodes; i++) {
-        const struct bus_node *node = bus->node[i];
+        const struct can_bus_node *node = bus->node[i];
         if (node == sender || !node->online || !hears(bus, sender, node)) {
             continue;
         }
@@ -315,10 +317,10 @@ static uint8_t judge(struct bus *bus, const struct bus_node *sender) {
     return acknowledged ? NO_ERROR : ERROR_ACK;
 }
 
-static void deliver(struct bus *bus, struct bus_node *sender) {
+static void deliver(struct can_bus *bus, struct can_bus_node *sender) {
     bus->frames++;
     for (size_t i = 0; i < bus->nodes; i++) {
-        struct bus_node *node = bus->node[i];
+        struct can_bus_node *node = bus->node[i];
         if (node != sender && node->online && hears(bus, sender, node)) {
             node->received_frames++;
             succeed(bus, node, false);
@@ -331,12 +333,12 @@ static void deliver(struct bus *bus, struct bus_node *sender) {
 }
 
 static void on_end(void *context, int64_t at_ticks) {
-    struct bus *bus = context;
-    struct bus_node *sender = bus->sender;
+    struct can_bus *bus = context;
+    struct can_bus_node *sender = bus->sender;
     if (!sender->online) { /* was switched off in the middle of its frame */
         bus->sender = NULL;
         bus->idle_ticks = at_ticks + INTERMISSION_BITS * sender->bit_ticks;
-        bus_attend(bus);
+        can_bus_attend(bus);
         return;
     }
     const uint8_t error = judge(bus, sender);
@@ -350,10 +352,10 @@ static void on_end(void *context, int64_t at_ticks) {
         fail(bus, sender, error);
     }
     recessive_run(bus); /* the frame's end and the intermission are such a run */
-    bus_attend(bus);
+    can_bus_attend(bus);
 }
 
-void bus_init(struct bus *bus, struct schedule *schedule, const int64_t *now_ticks) {
+void can_bus_init(struct can_bus *bus, struct schedule *schedule, const int64_t *now_ticks) {
     memset(bus, 0, sizeof *bus);
     bus->schedule = schedule;
     bus->now_ticks = now_ticks;
@@ -361,24 +363,24 @@ void bus_init(struct bus *bus, struct schedule *schedule, const int64_t *now_tic
     bus->idle_slot = schedule_add(schedule, on_idle, bus);
 }
 
-bool bus_join(struct bus *bus, struct bus_node *node) {
-    if (bus->nodes == BUS_NODES) {
+bool can_bus_join(struct can_bus *bus, struct can_bus_node *node) {
+    if (bus->nodes == CAN_BUS_NODES) {
         return false;
     }
     bus->node[bus->nodes++] = node;
     return true;
 }
 
-void bus_set_wire(struct bus *bus, enum bus_wire wire) {
+void can_bus_set_wire(struct can_bus *bus, enum can_bus_wire wire) {
     bus->wire = wire;
     bus->idle_ticks = bus->sender == NULL ? *bus->now_ticks : bus->idle_ticks;
-    bus_attend(bus);
+    can_bus_attend(bus);
 }
 
-void bus_start_node(struct bus *bus, struct bus_node *node) {
+void can_bus_start_node(struct can_bus *bus, struct can_bus_node *node) {
     node->recovery = node->bus_off ? RECOVERY_RUNS : 1u;
     if (bus->sender == NULL && bus->idle_ticks < *bus->now_ticks) {
         bus->idle_ticks = *bus->now_ticks; /* its eleven bits are counted from now */
     }
-    bus_attend(bus);
+    can_bus_attend(bus);
 }

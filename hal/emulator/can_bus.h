@@ -2,8 +2,8 @@
  * bits, acknowledgement, errors and their counters as ISO 11898-1 has them, bus-off, and faults of the wire.
  * Nodes are the emulated controller and as many ideal ones of scripts and sockets as one likes. Two nodes
  * that start the same identifier at the same time are not told apart: the first of them sends. */
-#ifndef TRIBEND_EMULATOR_BUS_H
-#define TRIBEND_EMULATOR_BUS_H
+#ifndef TRIBEND_EMULATOR_CAN_BUS_H
+#define TRIBEND_EMULATOR_CAN_BUS_H
 
 #include "emulator/schedule.h"
 
@@ -11,21 +11,21 @@
 
 #include "hal.h"
 
-#define BUS_NODES 6u
+#define CAN_BUS_NODES 6u
 
-struct bus_frame {
+struct can_bus_frame {
     struct hal_can_frame frame;
     bool remote;
     bool rate_switch;
 };
 
 /* One controller on the bus. Times of bits in ticks. */
-struct bus_node {
+struct can_bus_node {
     void *context;
     /* The frame it wants to send most; false: none. */
-    bool (*wants)(void *context, struct bus_frame *frame);
+    bool (*wants)(void *context, struct can_bus_frame *frame);
     void (*sent)(void *context);
-    void (*received)(void *context, const struct bus_frame *frame);
+    void (*received)(void *context, const struct can_bus_frame *frame);
     void (*changed)(void *context); /* an error counter or state; `last_error` says what happened */
     int64_t bit_ticks, data_bit_ticks;
     bool online;       /* takes part: acknowledges, sends, counts */
@@ -38,37 +38,37 @@ struct bus_node {
     uint64_t sent_frames, received_frames, error_frames;
 };
 
-enum bus_wire {
-    BUS_SOUND,
-    BUS_SHORTED,
-    BUS_OPEN
+enum can_bus_wire {
+    CAN_BUS_SOUND,
+    CAN_BUS_SHORTED,
+    CAN_BUS_OPEN
 }; /* open: the board's own node is cut off from the others */
 
-struct bus {
+struct can_bus {
     struct schedule *schedule;
     const int64_t *now_ticks;
-    struct bus_node *node[BUS_NODES]; /* [0] is the emulated controller */
+    struct can_bus_node *node[CAN_BUS_NODES]; /* [0] is the emulated controller */
     size_t nodes;
-    enum bus_wire wire;
+    enum can_bus_wire wire;
     uint32_t corrupt_next;             /* so many frames are hit on their way */
     uint32_t lose_ack_next;            /* so many frames are not acknowledged */
-    struct bus_frame frame;            /* on the wire */
-    struct bus_node *sender;           /* NULL: idle */
+    struct can_bus_frame frame;        /* on the wire */
+    struct can_bus_node *sender;       /* NULL: idle */
     int64_t started_ticks, idle_ticks; /* since when it has been idle */
     size_t slot, idle_slot;
     int64_t busy_ticks; /* in all */
     uint64_t frames, errors;
 };
 
-void bus_init(struct bus *bus, struct schedule *schedule, const int64_t *now_ticks);
+void can_bus_init(struct can_bus *bus, struct schedule *schedule, const int64_t *now_ticks);
 /* False: no room. */
-bool bus_join(struct bus *bus, struct bus_node *node);
+bool can_bus_join(struct can_bus *bus, struct can_bus_node *node);
 /* Somebody has something to send, or the wire changed. */
-void bus_attend(struct bus *bus);
-void bus_set_wire(struct bus *bus, enum bus_wire wire);
+void can_bus_attend(struct can_bus *bus);
+void can_bus_set_wire(struct can_bus *bus, enum can_bus_wire wire);
 /* The node starts anew: after 11 recessive bits, or after 128 times that when it was off the bus. */
-void bus_start_node(struct bus *bus, struct bus_node *node);
+void can_bus_start_node(struct can_bus *bus, struct can_bus_node *node);
 /* Length of a frame on the wire, intermission apart; data bits counted at their own time. */
-int64_t bus_frame_ticks(const struct bus_frame *frame, int64_t bit_ticks, int64_t data_bit_ticks);
+int64_t can_bus_frame_ticks(const struct can_bus_frame *frame, int64_t bit_ticks, int64_t data_bit_ticks);
 
 #endif
