@@ -230,6 +230,9 @@ bool rcc_write(void *context, uint32_t offset, uint32_t value) {
     uint32_t *word = gate(rcc, offset);
     if (word != NULL) {
         *word = value;
+        if (word == &rcc->selection && rcc->changed != NULL) {
+            rcc->changed(rcc->context); /* a peripheral's own clock */
+        }
         return true;
     }
     switch (offset) {

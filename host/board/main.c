@@ -9,7 +9,7 @@
 #include <time.h>
 
 #include "board/board_record.h"
-#include "board/board_watch.h"
+#include "board/board_changes.h"
 #include "board/can_socket.h"
 #include "cli/commands.h"
 #include "units/units.h"
@@ -171,7 +171,7 @@ struct session {
     const struct settings *settings;
     struct board board;
     struct can_socket can;
-    struct board_watch watch;
+    struct board_changes changes;
     struct board_record record;
     struct pace pace;
 };
@@ -183,7 +183,7 @@ static int run(struct session *session) {
     pace_start(&session->pace, 0);
     while (board_time_us(&session->board) < end_us && program_interrupted == 0) {
         board_run(&session->board, SLICE_US);
-        board_watch_look(&session->watch, &session->board);
+        board_changes_look(&session->changes, &session->board);
         if (settings->bus != NULL && !can_socket_exchange(&session->can, &session->board)) {
             return program_fail(EXIT_OUTPUT, "bus %s: gone: %s", settings->bus, strerror(errno));
         }
@@ -295,7 +295,7 @@ int main(int argc, char **argv) {
         return code;
     }
     session.settings = &settings;
-    session.watch.out = settings.quiet ? NULL : stdout;
+    session.changes.out = settings.quiet ? NULL : stdout;
     const int result = open_and_use(&session, &file.table);
     table_file_close(&file);
     return result;
