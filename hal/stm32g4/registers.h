@@ -186,6 +186,7 @@ struct tim_registers {
 #define TIM_CCMR_LOW_PWM1 0x0068u  /* channel 1 or 3: PWM mode 1 (on below the compare value), preloaded */
 #define TIM_CCMR_HIGH_PWM1 0x6800u  /* channel 2 or 4 */
 #define TIM_CCMR_HIGH_PWM2 0x7800u  /* channel 4: on from the compare value on */
+#define TIM_CCMR_PRELOADS 0x0808u
 #define TIM_CCER_CC1E (1u << 0)
 #define TIM_CCER_CC2E (1u << 4)
 #define TIM_CCER_CC3E (1u << 8)
@@ -220,6 +221,7 @@ struct adc_common_registers {
 #define ADC_ISR_OVR (1u << 4)
 #define ADC_CR_ADEN (1u << 0)
 #define ADC_CR_ADSTART (1u << 2)
+#define ADC_CR_ADSTP (1u << 4)
 #define ADC_CR_ADVREGEN (1u << 28)
 #define ADC_CR_DEEPPWD (1u << 29)
 #define ADC_CR_ADCAL (1u << 31)
@@ -250,6 +252,7 @@ struct dma_registers {
 #define DMA1_ADDRESS 0x40020000u
 #define DMAMUX1_CHANNEL0_ADDRESS 0x40020800u
 #define DMA_ISR_TCIF1 (1u << 1)
+#define DMA_ISR_HTIF1 (1u << 2)
 #define DMA_ISR_TEIF1 (1u << 3)
 #define DMA_CCR_EN (1u << 0)
 #define DMA_CCR_CIRC (1u << 5)

@@ -108,6 +108,34 @@ $(BUILD)/tests/%: $(BUILD)/tests/%.o $(SUPPORT_O) $(HOST_O) $(SIM_O) $(FIRMWARE_
 .SECONDARY:
 -include $(patsubst %.c,$(BUILD)/%.d,$(ALL_C))
 
+# --- firmware for the board: the same sources and hal/stm32g4, by the ARM compiler
+BOARD      := $(BUILD)/board
+BOARD_C    := $(wildcard hal/stm32g4/*.c)
+# what of the port has no register in it and is built for the host, too, to be tested and to replay recorded readings
+PORT_PURE_C := hal/stm32g4/conversions.c hal/stm32g4/crash_record.c
+BOARD_O    := $(patsubst %.c,$(BOARD)/%.o,$(FIRMWARE_C) $(BOARD_C)) $(BOARD)/hal/stm32g4/table_a.o
+BOARD_TABLE := tables/paper-semicircle.tbt
+BOARD_CC   := arm-none-eabi-gcc
+ARM_CORE   := -mcpu=cortex-m4 -mthumb -mfloat-abi=hard -mfpu=fpv4-sp-d16
+BOARD_FLAGS := $(ARM_CORE) -O2 -g -ffunction-sections -fdata-sections -fstack-usage
+BOARD_LINK := $(ARM_CORE) --specs=nano.specs -nostartfiles -T hal/stm32g4/stm32g474.ld -Wl,--gc-sections -Wl,--fatal-warnings
+ELF        := $(BUILD)/firmware/tribend.elf
+
+$(BOARD)/%.o: %.c
+	@mkdir -p $(@D)
+	$(say)$(BOARD_CC) $(BOARD_FLAGS) $(FIRMWARE_FLAGS) -MMD -MP -c $< -o $@
+$(BOARD)/hal/stm32g4/table_a.o: hal/stm32g4/table_a.S $(BOARD_TABLE)
+	@mkdir -p $(@D)
+	$(say)$(BOARD_CC) $(ARM_CORE) -DTABLE_A_FILE='"$(BOARD_TABLE)"' -c $< -o $@
+$(ELF): $(BOARD_O) hal/stm32g4/stm32g474.ld
+	@mkdir -p $(@D)
+	$(if $(V),,@echo '  link $@';) $(BOARD_CC) $(BOARD_LINK) -Wl,-Map=$(@:.elf=.map) $(BOARD_O) -o $@
+$(ELF:.elf=.hex): $(ELF)
+	@arm-none-eabi-objcopy -O ihex $< $@
+$(ELF:.elf=.bin): $(ELF)
+	@arm-none-eabi-objcopy -O binary --gap-fill 0xff $< $@
+-include $(patsubst %.c,$(BOARD)/%.d,$(FIRMWARE_C) $(BOARD_C))
+
 # --- lint: every compiler that the firmware must build with, then the analysers
 ARM_FLAGS := -mcpu=cortex-m4 -mthumb -mfloat-abi=hard -mfpu=fpv4-sp-d16 -Os
 CPPCHECK_FLAGS := --enable=warning,performance,portability --inline-suppr --error-exitcode=1 --quiet \
