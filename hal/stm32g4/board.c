@@ -61,7 +61,8 @@ static void need(bool started, enum part part) {
     }
 }
 
-/* A core that a debugger halts stops the valves' timer, which then drives its outputs low, and the watchdog. */
+/* A core that a debugger halts stops the valves' timer, which then drives its outputs low, and the watchdog.
+ */
 static void let_debugger_halt(void) {
     DBGMCU->apb1fzr1 = DBGMCU_APB1FZR1_TIM2 | DBGMCU_APB1FZR1_TIM3 | DBGMCU_APB1FZR1_IWDG;
     DBGMCU->apb2fz = DBGMCU_APB2FZ_TIM1;

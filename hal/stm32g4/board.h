@@ -28,7 +28,8 @@ struct board {
     uint16_t reference_calibration;
 };
 
-/* Everything but the bus; valves off. A peripheral that the valves' safety needs and that does not start is a crash. */
+/* Everything but the bus; valves off. A peripheral that the valves' safety needs and that does not start is a
+ * crash. */
 void board_start(struct board *board, uint32_t *clock_hz);
 /* Time 0. */
 void board_run(struct board *board);

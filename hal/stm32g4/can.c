@@ -36,15 +36,6 @@ static bool fd_enabled;
 static bool off_seen; /* bus-off, and since when */
 static int64_t off_us;
 
-static bool becomes(const reg32 *reg, uint32_t mask, uint32_t value) {
-    for (uint32_t i = 0; i < POLLS; i++) {
-        if ((*reg & mask) == value) {
-            return true;
-        }
-    }
-    return false;
-}
-
 static bool is_full(const struct frame_ring *ring) {
     return ring->written - ring->taken >= RING;
 }
@@ -56,7 +47,8 @@ static void read_element(const struct fdcan_element *element, struct hal_can_fra
     frame->extended = (id & FDCAN_ID_EXTENDED) != 0u;
     frame->id = frame->extended ? id & EXTENDED_ID_MOST : (id >> FDCAN_ID_STANDARD_SHIFT) & STANDARD_ID_MOST;
     frame->fd = (control & FDCAN_CONTROL_FD) != 0u;
-    const uint8_t length = conversions_can_length((control >> FDCAN_CONTROL_LENGTH_SHIFT) & FDCAN_CONTROL_LENGTH_MASK);
+    const uint8_t length =
+        conversions_can_length((control >> FDCAN_CONTROL_LENGTH_SHIFT) & FDCAN_CONTROL_LENGTH_MASK);
     frame->length = !frame->fd && length > CLASSIC_BYTES ? CLASSIC_BYTES : length;
     for (uint32_t i = 0; i < frame->length; i += 4u) {
         const uint32_t word = element->data[i / 4u];
@@ -137,7 +129,8 @@ static bool receive(void *context, struct hal_can_frame *frame) {
 
 static bool can_carry(const struct hal_can_frame *frame) {
     uint32_t code;
-    return conversions_can_code(frame->length, &code) && frame->id <= (frame->extended ? EXTENDED_ID_MOST : STANDARD_ID_MOST) &&
+    return conversions_can_code(frame->length, &code) &&
+           frame->id <= (frame->extended ? EXTENDED_ID_MOST : STANDARD_ID_MOST) &&
            (frame->fd ? fd_enabled : frame->length <= CLASSIC_BYTES);
 }
 
@@ -212,7 +205,8 @@ static bool set_nominal_timing(uint32_t clock_hz, uint32_t rate) {
     if (!conversions_can_timing(clock_hz, rate, NOMINAL_SAMPLE_PERMILLE, &can_nominal_limits, &timing)) {
         return false;
     }
-    FDCAN1->nbtp = ((timing.jump - 1u) << FDCAN_NBTP_NSJW_SHIFT) | ((timing.prescaler - 1u) << FDCAN_NBTP_NBRP_SHIFT) |
+    FDCAN1->nbtp = ((timing.jump - 1u) << FDCAN_NBTP_NSJW_SHIFT) |
+                   ((timing.prescaler - 1u) << FDCAN_NBTP_NBRP_SHIFT) |
                    ((timing.segment_1 - 1u) << FDCAN_NBTP_NTSEG1_SHIFT) | (timing.segment_2 - 1u);
     return true;
 }
@@ -263,7 +257,7 @@ bool can_start(uint32_t clock_hz, const struct can_settings *settings, struct ha
     RCC->apb1enr1 |= RCC_APB1ENR1_FDCAN;
     (void)RCC->apb1enr1;
     FDCAN1->cccr = FDCAN_CCCR_INIT;
-    if (!becomes(&FDCAN1->cccr, FDCAN_CCCR_INIT, FDCAN_CCCR_INIT)) {
+    if (!core_await(&FDCAN1->cccr, FDCAN_CCCR_INIT, FDCAN_CCCR_INIT, POLLS)) {
         return false;
     }
     FDCAN1->cccr = FDCAN_CCCR_INIT | FDCAN_CCCR_CCE;
@@ -279,5 +273,5 @@ bool can_start(uint32_t clock_hz, const struct can_settings *settings, struct ha
     set_interrupts();
     FDCAN1->cccr = FDCAN_CCCR_INIT | FDCAN_CCCR_CCE | (fd_enabled ? FDCAN_CCCR_FDOE | FDCAN_CCCR_BRSE : 0u);
     FDCAN1->cccr &= ~FDCAN_CCCR_INIT;
-    return becomes(&FDCAN1->cccr, FDCAN_CCCR_INIT, 0u);
+    return core_await(&FDCAN1->cccr, FDCAN_CCCR_INIT, 0u, POLLS);
 }

@@ -7,7 +7,8 @@
 
 #include "hal.h"
 
-/* Standard identifiers that are taken: those that equal `id` in the bits set in `mask`. All others cost nothing. */
+/* Standard identifiers that are taken: those that equal `id` in the bits set in `mask`. All others cost
+ * nothing. */
 struct can_filter {
     uint16_t id;
     uint16_t mask;
@@ -25,8 +26,8 @@ struct can_settings {
 
 #define CAN_RECOVERY_US 100000
 
-/* On the bus, or false: no such rate from this clock, or the controller does not answer. A data rate that cannot be had
- * leaves FD frames out. Binds `bus` either way. */
+/* On the bus, or false: no such rate from this clock, or the controller does not answer. A data rate that
+ * cannot be had leaves FD frames out. Binds `bus` either way. */
 bool can_start(uint32_t clock_hz, const struct can_settings *settings, struct hal_bus *bus);
 /* Once a step: returns to the bus CAN_RECOVERY_US after bus-off. */
 void can_step(int64_t time_us);

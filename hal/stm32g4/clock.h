@@ -1,5 +1,5 @@
-/* The clock tree: 170 MHz from the crystal, else from the internal oscillator, else that oscillator's 16 MHz as it is. Every
- * wait has an end. */
+/* The clock tree: 170 MHz from the crystal, else from the internal oscillator, else that oscillator's 16 MHz
+ * as it is. Every wait has an end. */
 #ifndef TRIBEND_STM32G4_CLOCK_H
 #define TRIBEND_STM32G4_CLOCK_H
 

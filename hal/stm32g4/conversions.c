@@ -9,10 +9,16 @@
 #define PWM_COUNTS_MOST 65536u
 #define HZ_PER_MHZ 1000000u
 
-const struct sensor_transfer chamber_sensor = {
-    .ratio_at_zero = 0.1f, .ratio_at_full = 0.9f, .full_pa = 50000.0f, .ratio_least = 0.05f, .ratio_most = 0.95f};
-const struct sensor_transfer supply_sensor = {
-    .ratio_at_zero = 0.1f, .ratio_at_full = 0.9f, .full_pa = 100000.0f, .ratio_least = 0.05f, .ratio_most = 0.95f};
+const struct sensor_transfer chamber_sensor = {.ratio_at_zero = 0.1f,
+                                               .ratio_at_full = 0.9f,
+                                               .full_pa = 50000.0f,
+                                               .ratio_least = 0.05f,
+                                               .ratio_most = 0.95f};
+const struct sensor_transfer supply_sensor = {.ratio_at_zero = 0.1f,
+                                              .ratio_at_full = 0.9f,
+                                              .full_pa = 100000.0f,
+                                              .ratio_least = 0.05f,
+                                              .ratio_most = 0.95f};
 
 bool conversions_pressure(const struct sensor_transfer *transfer, uint16_t raw, float *pressure_pa) {
     const float ratio = (float)raw / (float)RAW_FULL_SCALE;
@@ -33,8 +39,8 @@ void conversions_pressures(const uint16_t raw[RAW_CHANNEL_COUNT], uint16_t calib
     const float reference_v = conversions_reference_v(raw[RAW_REFERENCE], calibration);
     const bool sound = reference_v >= REFERENCE_LEAST_V && reference_v <= REFERENCE_MOST_V;
     for (uint32_t c = 0; c < 3u; c++) {
-        const bool in_range =
-            conversions_pressure(&chamber_sensor, raw[(uint32_t)RAW_CHAMBER_1 + c], &pressures->chamber_pa[c]);
+        const bool in_range = conversions_pressure(&chamber_sensor, raw[(uint32_t)RAW_CHAMBER_1 + c],
+                                                   &pressures->chamber_pa[c]);
         pressures->chamber_ok[c] = sound && in_range;
     }
     const bool in_range = conversions_pressure(&supply_sensor, raw[RAW_SUPPLY], &pressures->supply_pa);
@@ -48,7 +54,8 @@ bool conversions_pwm_scale(uint32_t clock_hz, uint32_t period_us, struct pwm_sca
     }
     for (uint32_t counts_per_us = PWM_COUNTS_MOST / period_us; counts_per_us > 0u; counts_per_us--) {
         if (clock_mhz % counts_per_us == 0u) {
-            *scale = (struct pwm_scale){.prescaler = clock_mhz / counts_per_us, .counts = counts_per_us * period_us};
+            *scale = (struct pwm_scale){.prescaler = clock_mhz / counts_per_us,
+                                        .counts = counts_per_us * period_us};
             return scale->prescaler > 0u;
         }
     }
@@ -70,7 +77,8 @@ const struct can_timing_limits can_data_limits = {
 /* Rounded to the quantum nearest the wanted sample point. */
 static bool split_bit(uint32_t quanta, uint32_t sample_permille, const struct can_timing_limits *limits,
                       struct can_timing *timing) {
-    const uint32_t before = (quanta * sample_permille + 500u) / 1000u; /* of the sample point, sync quantum included */
+    const uint32_t before =
+        (quanta * sample_permille + 500u) / 1000u; /* of the sample point, sync quantum included */
     if (before < 2u || before >= quanta) {
         return false;
     }
@@ -95,7 +103,8 @@ bool conversions_can_timing(uint32_t clock_hz, uint32_t rate, uint32_t sample_pe
     return false;
 }
 
-static const uint8_t length_of_code[16] = {0u, 1u, 2u, 3u, 4u, 5u, 6u, 7u, 8u, 12u, 16u, 20u, 24u, 32u, 48u, 64u};
+static const uint8_t length_of_code[16] = {0u, 1u,  2u,  3u,  4u,  5u,  6u,  7u,
+                                           8u, 12u, 16u, 20u, 24u, 32u, 48u, 64u};
 
 uint8_t conversions_can_length(uint32_t code) {
     return length_of_code[code & 15u];

@@ -1,10 +1,23 @@
-/* What C cannot say: interrupt masking, waiting and barriers of the Cortex-M4, and its interrupt controller. */
+/* What C cannot say: interrupt masking, waiting and barriers of the Cortex-M4, and its interrupt controller.
+ */
 #ifndef TRIBEND_STM32G4_CORE_H
 #define TRIBEND_STM32G4_CORE_H
 
+#include <stdbool.h>
 #include <stdint.h>
 
 #include "stm32g4/registers.h"
+
+/* Polls a register at most `polls` times (each takes at least five cycles) until its bits in `mask` are
+ * `value`. */
+static inline bool core_await(const reg32 *reg, uint32_t mask, uint32_t value, uint32_t polls) {
+    for (uint32_t i = 0; i < polls; i++) {
+        if ((*reg & mask) == value) {
+            return true;
+        }
+    }
+    return false;
+}
 
 /* Masks interrupts; returns what core_unmask() needs to restore the state before. */
 static inline uint32_t core_mask(void) {

@@ -1,7 +1,8 @@
-/* What is kept across a reset: the crash record that a fault handler wrote, and the mark of a firmware that was running.
+/* What is kept across a reset: the crash record that a fault handler wrote, and the mark of a firmware that
+ * was running.
  *
- * Pure: seals and checks memory that nobody initialises, which after power-on holds anything. Not here: where that memory
- * lies and who writes it (faults.h). */
+ * Pure: seals and checks memory that nobody initialises, which after power-on holds anything. Not here: where
+ * that memory lies and who writes it (faults.h). */
 #ifndef TRIBEND_STM32G4_CRASH_RECORD_H
 #define TRIBEND_STM32G4_CRASH_RECORD_H
 
@@ -16,10 +17,10 @@ enum crash_cause {
     CRASH_MEMORY_FAULT = 4,
     CRASH_BUS_FAULT = 5,
     CRASH_USAGE_FAULT = 6,
-    CRASH_SUPPLY_DIP = 16,       /* the supply of the electronics fell under 2.9 V */
-    CRASH_CLOCK_LOST = 17,       /* the crystal failed, and the PLL did not start from the internal oscillator */
-    CRASH_UNEXPECTED = 18,       /* an interrupt that nobody asked for; its number is in `address` */
-    CRASH_SETUP = 19             /* a peripheral did not start; its place in the order of start is in `address` */
+    CRASH_SUPPLY_DIP = 16, /* the supply of the electronics fell under 2.9 V */
+    CRASH_CLOCK_LOST = 17, /* the crystal failed, and the PLL did not start from the internal oscillator */
+    CRASH_UNEXPECTED = 18, /* an interrupt that nobody asked for; its number is in `address` */
+    CRASH_SETUP = 19       /* a peripheral did not start; its place in the order of start is in `address` */
 };
 
 struct crash_record {

@@ -8,7 +8,8 @@
 #include "stm32g4/registers.h"
 #include "stm32g4/valves.h"
 
-#define CFSR_STACKING (0x10u | 0x20u | 0x1000u | 0x2000u) /* MSTKERR MLSPERR STKERR LSPERR: no frame was stored */
+#define CFSR_STACKING                                                                                        \
+    (0x10u | 0x20u | 0x1000u | 0x2000u) /* MSTKERR MLSPERR STKERR LSPERR: no frame was stored */
 #define CFSR_MMARVALID 0x80u
 #define CFSR_BFARVALID 0x8000u
 #define FRAME_BYTES 32u
@@ -84,8 +85,11 @@ _Noreturn void faults_enter(uint32_t stack_pointer, uint32_t exception);
 _Noreturn void faults_enter(uint32_t stack_pointer, uint32_t exception) {
     valves_shut();
     const uint32_t cfsr = SCB->cfsr;
-    struct crash_record record = {
-        .cause = exception, .sp = stack_pointer, .cfsr = cfsr, .hfsr = SCB->hfsr, .address = fault_address(cfsr)};
+    struct crash_record record = {.cause = exception,
+                                  .sp = stack_pointer,
+                                  .cfsr = cfsr,
+                                  .hfsr = SCB->hfsr,
+                                  .address = fault_address(cfsr)};
     if (frame_is_readable(stack_pointer, cfsr)) {
         const struct exception_frame *frame = (const struct exception_frame *)(uintptr_t)stack_pointer;
         record.pc = frame->pc;

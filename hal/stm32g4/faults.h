@@ -22,7 +22,8 @@ void faults_begin(struct faults_start *start);
 void faults_mark_step(uint32_t step, uint32_t state);
 /* Shuts the valves, keeps a record and resets. */
 _Noreturn void faults_stop(enum crash_cause cause, uint32_t address);
-/* Double words in slots and parameters that read with two wrong bits, as those do whose writing was cut off. */
+/* Double words in slots and parameters that read with two wrong bits, as those do whose writing was cut off.
+ */
 uint32_t faults_torn_words(void);
 
 #endif

@@ -104,7 +104,8 @@ static bool erase_page(void *context, enum hal_storage_area area, uint32_t offse
 }
 
 static uint32_t word_of(const uint8_t bytes[4]) {
-    return (uint32_t)bytes[0] | ((uint32_t)bytes[1] << 8) | ((uint32_t)bytes[2] << 16) | ((uint32_t)bytes[3] << 24);
+    return (uint32_t)bytes[0] | ((uint32_t)bytes[1] << 8) | ((uint32_t)bytes[2] << 16) |
+           ((uint32_t)bytes[3] << 24);
 }
 
 static bool program(void *context, enum hal_storage_area area, uint32_t offset,

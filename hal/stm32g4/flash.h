@@ -9,7 +9,8 @@
 
 /* Binds `storage`. False: the option bytes have the two banks as one; every operation is then refused. */
 bool flash_start(struct hal_storage *storage);
-/* True once after an operation in the bank that the firmware runs from: the core may have stood still since. */
+/* True once after an operation in the bank that the firmware runs from: the core may have stood still since.
+ */
 bool flash_take_stall(void);
 /* Whether the byte at `offset` of bank 1 or 2 lies in one of the areas of hal_storage. */
 bool flash_is_storage(bool second_bank, uint32_t offset);

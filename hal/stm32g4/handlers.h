@@ -1,4 +1,5 @@
-/* The interrupt and fault handlers, by the names that the vector table (startup.c) has them; each is in its driver's file. */
+/* The interrupt and fault handlers, by the names that the vector table (startup.c) has them; each is in its
+ * driver's file. */
 #ifndef TRIBEND_STM32G4_HANDLERS_H
 #define TRIBEND_STM32G4_HANDLERS_H
 

@@ -13,6 +13,7 @@ extern const uint32_t linker_data_image[];
 extern uint32_t linker_bss_start[];
 extern uint32_t linker_bss_end[];
 extern const uint8_t linker_table_a[];
+extern const uint8_t linker_table_a_end[]; /* of what was flashed */
 extern const uint8_t linker_table_b[];
 extern const uint8_t linker_parameters_a[];
 extern const uint8_t linker_parameters_b[];

@@ -9,17 +9,10 @@ static struct board board;
 static struct bend_table table;
 static struct app app;
 
-/* The first slot that holds a sound table; NULL: none does, and pressures are all that can be commanded. */
+/* NULL: what was flashed is no sound table, and pressures are all that can be commanded. */
 static const struct bend_table *open_table(void) {
-    const enum hal_storage_area slots[2] = {HAL_STORAGE_TABLE_A, HAL_STORAGE_TABLE_B};
-    for (uint32_t i = 0; i < 2u; i++) {
-        uint32_t bytes = 0u;
-        const uint8_t *image = board.storage.map(board.storage.context, slots[i], &bytes);
-        if (bend_table_open(&table, image, bytes, NULL) == BEND_TABLE_OK) {
-            return &table;
-        }
-    }
-    return NULL;
+    const uint32_t bytes = (uint32_t)((uintptr_t)linker_table_a_end - (uintptr_t)linker_table_a);
+    return bend_table_open(&table, linker_table_a, bytes, NULL) == BEND_TABLE_OK ? &table : NULL;
 }
 
 int main(void) {

@@ -1,5 +1,5 @@
-/* Pins: what each is used as. A valve's pin is low from the first instruction on; before that, and in reset, it floats and
- * the gate's pull-down holds it low (WIRING.md). */
+/* Pins: what each is used as. A valve's pin is low from the first instruction on; before that, and in reset,
+ * it floats and the gate's pull-down holds it low (WIRING.md). */
 #ifndef TRIBEND_STM32G4_PINS_H
 #define TRIBEND_STM32G4_PINS_H
 

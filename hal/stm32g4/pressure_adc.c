@@ -17,15 +17,6 @@
 static volatile uint16_t samples[SEQUENCES][RAW_CHANNEL_COUNT];
 static uint32_t errors;
 
-static bool becomes(const reg32 *reg, uint32_t mask, uint32_t value) {
-    for (uint32_t i = 0; i < POLLS; i++) {
-        if ((*reg & mask) == value) {
-            return true;
-        }
-    }
-    return false;
-}
-
 static bool power_up(void) {
     RCC->ahb2enr |= RCC_AHB2ENR_ADC12;
     (void)RCC->ahb2enr;
@@ -35,19 +26,21 @@ static bool power_up(void) {
     for (volatile uint32_t i = 0; i < REGULATOR_TURNS; i++) {
     }
     ADC1->cr = ADC_CR_ADVREGEN | ADC_CR_ADCAL;
-    if (!becomes(&ADC1->cr, ADC_CR_ADCAL, 0u)) {
+    if (!core_await(&ADC1->cr, ADC_CR_ADCAL, 0u, POLLS)) {
         return false;
     }
-    for (volatile uint32_t i = 0; i < REGULATOR_TURNS; i++) { /* four converter clocks between ADCAL and ADEN */
+    for (volatile uint32_t i = 0; i < REGULATOR_TURNS;
+         i++) { /* four converter clocks between ADCAL and ADEN */
     }
     ADC1->isr = ADC_ISR_ADRDY;
     ADC1->cr = ADC_CR_ADVREGEN | ADC_CR_ADEN;
-    return becomes(&ADC1->isr, ADC_ISR_ADRDY, ADC_ISR_ADRDY);
+    return core_await(&ADC1->isr, ADC_ISR_ADRDY, ADC_ISR_ADRDY, POLLS);
 }
 
 static void set_sequence(void) {
     ADC1->cfgr2 = ADC_CFGR2_ROVSE | ADC_CFGR2_OVSR_16; /* sums, not shifted */
-    ADC1->smpr1 = (ADC_SAMPLE_47_5 << (3u * CHANNEL_CHAMBER_1)) | (ADC_SAMPLE_47_5 << (3u * CHANNEL_CHAMBER_2)) |
+    ADC1->smpr1 = (ADC_SAMPLE_47_5 << (3u * CHANNEL_CHAMBER_1)) |
+                  (ADC_SAMPLE_47_5 << (3u * CHANNEL_CHAMBER_2)) |
                   (ADC_SAMPLE_47_5 << (3u * CHANNEL_CHAMBER_3)) | (ADC_SAMPLE_47_5 << (3u * CHANNEL_SUPPLY));
     ADC1->smpr2 = ADC_SAMPLE_247_5 << (3u * (CHANNEL_REFERENCE - 10u)); /* the reference wants 4 us */
     ADC1->sqr1 = ((uint32_t)RAW_CHANNEL_COUNT - 1u) | (CHANNEL_CHAMBER_1 << 6) | (CHANNEL_CHAMBER_2 << 12) |
@@ -63,7 +56,8 @@ static void start_transfers(void) {
     DMA1->cpar1 = (uint32_t)(uintptr_t)&ADC1->dr;
     DMA1->cmar1 = (uint32_t)(uintptr_t)samples;
     DMA1->cndtr1 = TRANSFERS;
-    DMA1->ccr1 = DMA_CCR_CIRC | DMA_CCR_MINC | DMA_CCR_PSIZE_16 | DMA_CCR_MSIZE_16 | DMA_CCR_PL_HIGH | DMA_CCR_EN;
+    DMA1->ccr1 =
+        DMA_CCR_CIRC | DMA_CCR_MINC | DMA_CCR_PSIZE_16 | DMA_CCR_MSIZE_16 | DMA_CCR_PL_HIGH | DMA_CCR_EN;
 }
 
 bool pressure_adc_start(void) {
@@ -83,12 +77,12 @@ bool pressure_adc_start(void) {
     return true;
 }
 
-/* A failed transfer has switched the channel off; the sequence that is then written may start in the middle of one of the
- * converter's, so the converter starts anew, too. */
+/* A failed transfer has switched the channel off; the sequence that is then written may start in the middle
+ * of one of the converter's, so the converter starts anew, too. */
 static void start_again(void) {
     errors++;
     ADC1->cr = ADC_CR_ADVREGEN | ADC_CR_ADSTP;
-    if (becomes(&ADC1->cr, ADC_CR_ADSTART, 0u)) {
+    if (core_await(&ADC1->cr, ADC_CR_ADSTART, 0u, POLLS)) {
         start_transfers();
         ADC1->cr = ADC_CR_ADVREGEN | ADC_CR_ADSTART;
     }
@@ -104,7 +98,8 @@ bool pressure_adc_take(uint16_t raw[RAW_CHANNEL_COUNT]) {
     if ((flags & (DMA_ISR_TCIF1 | DMA_ISR_HTIF1)) == 0u) {
         return false;
     }
-    const uint32_t whole = DMA1->cndtr1 > (uint32_t)RAW_CHANNEL_COUNT ? 1u : 0u; /* the other is being written */
+    const uint32_t whole =
+        DMA1->cndtr1 > (uint32_t)RAW_CHANNEL_COUNT ? 1u : 0u; /* the other is being written */
     for (uint32_t i = 0; i < (uint32_t)RAW_CHANNEL_COUNT; i++) {
         raw[i] = samples[whole][i];
     }

@@ -1,4 +1,5 @@
-/* The pressure sensors: five channels of ADC1, sampled 250 us before each control step and put into RAM by DMA. */
+/* The pressure sensors: five channels of ADC1, sampled 250 us before each control step and put into RAM by
+ * DMA. */
 #ifndef TRIBEND_STM32G4_PRESSURE_ADC_H
 #define TRIBEND_STM32G4_PRESSURE_ADC_H
 

@@ -1,4 +1,5 @@
-/* Time: the microsecond counter (TIM2), the tick of the control step (TIM3), and the watch over the steps that follow it. */
+/* Time: the microsecond counter (TIM2), the tick of the control step (TIM3), and the watch over the steps
+ * that follow it. */
 #ifndef TRIBEND_STM32G4_TIME_BASE_H
 #define TRIBEND_STM32G4_TIME_BASE_H
 

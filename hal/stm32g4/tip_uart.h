@@ -1,5 +1,5 @@
-/* The tip sensor's bytes: USART3 receives them by interrupt into a ring, each with the time of its arrival. What they mean
- * is the comms layer's. */
+/* The tip sensor's bytes: USART3 receives them by interrupt into a ring, each with the time of its arrival.
+ * What they mean is the comms layer's. */
 #ifndef TRIBEND_STM32G4_TIP_UART_H
 #define TRIBEND_STM32G4_TIP_UART_H
 

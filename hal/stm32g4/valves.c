@@ -9,7 +9,8 @@
 #define VALVE_PIN_FIRST 8u
 #define SUPPLY_PIN 5u
 
-/* Idle outputs are driven low; a break of the chip itself (lock-up, supply) clears MOE, which only software sets again. */
+/* Idle outputs are driven low; a break of the chip itself (lock-up, supply) clears MOE, which only software
+ * sets again. */
 #define BDTR_OFF (TIM_BDTR_OSSI | TIM_BDTR_OSSR | TIM_BDTR_BKE | TIM_BDTR_BKP)
 
 static uint32_t period_counts;
@@ -39,8 +40,8 @@ bool valves_start(uint32_t clock_hz) {
     return true;
 }
 
-/* Off now, and nothing left of the running period's duty should they be enabled again within it: without preload a compare
- * value holds at once. */
+/* Off now, and nothing left of the running period's duty should they be enabled again within it: without
+ * preload a compare value holds at once. */
 static void stop_valves(void) {
     TIM1->bdtr = BDTR_OFF;
     TIM1->ccmr1 = (TIM_CCMR_LOW_PWM1 | TIM_CCMR_HIGH_PWM1) & ~TIM_CCMR_PRELOADS;

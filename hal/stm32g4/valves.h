@@ -1,4 +1,5 @@
-/* The three valve outputs (TIM1) and the supply shut-off (PB5): low until they are told otherwise, and at once when shut. */
+/* The three valve outputs (TIM1) and the supply shut-off (PB5): low until they are told otherwise, and at
+ * once when shut. */
 #ifndef TRIBEND_STM32G4_VALVES_H
 #define TRIBEND_STM32G4_VALVES_H
 

@@ -11,7 +11,8 @@
 
 static uint32_t counts;
 
-/* The registers are in the oscillator's domain: a second write must wait for the first, as the next step does. */
+/* The registers are in the oscillator's domain: a second write must wait for the first, as the next step
+ * does. */
 static void set_counts(uint32_t wanted) {
     if (wanted != counts && (IWDG->sr & IWDG_SR_UPDATING) == 0u) {
         IWDG->kr = IWDG_KEY_WRITE;
@@ -29,7 +30,7 @@ void watchdog_start(void) {
     counts = COUNTS_START;
 }
 
-void watchdog_feed(bool valves_enabled) {
-    set_counts(valves_enabled ? COUNTS_MOVING : COUNTS_VENTED);
+void watchdog_feed(bool moving) {
+    set_counts(moving ? COUNTS_MOVING : COUNTS_VENTED);
     IWDG->kr = IWDG_KEY_FEED;
 }
