@@ -14,7 +14,7 @@ SHELL    := /bin/bash
 MAKEFLAGS += --no-builtin-rules
 include tests/tools/build.mk
 
-.PHONY: help setup all demo test bench gap-check lint format tables clean
+.PHONY: help setup all demo test bench gap-check firmware flash misra lint format tables clean
 
 help: ## list these targets
 	@grep -hE '^[a-z-]+:.*## ' Makefile | awk -F ':.*## ' '{printf "  make %-10s %s\n", $$1, $$2}'
@@ -29,7 +29,7 @@ demo: setup ## from the material to a bent tip, with pictures (sets up what is m
 	@tests/tools/demo $(BUILD)
 
 test: setup ## build and run every test (sets up what is missing first)
-	@$(MAKE) --no-print-directory -j$(JOBS) all test-programs
+	@$(MAKE) --no-print-directory -j$(JOBS) all test-programs firmware-files
 	@tests/tools/run_tests $(BUILD)
 
 bench: setup ## time equilibrium, table, simulation and diagnosis on this machine (PART=gap: one part)
@@ -39,6 +39,18 @@ bench: setup ## time equilibrium, table, simulation and diagnosis on this machin
 gap-check: setup ## blind check of the diagnosis: data of another plant, truth withheld (FULL=1: four times as many; MPI_RANKS=n)
 	@$(MAKE) --no-print-directory -j$(JOBS) all test-programs
 	@tests/gap/blind/gap_check
+
+firmware: ## build what is flashed (ELF, hex, bin, map in BUILD/firmware) and hold flash, RAM and stack to their bounds
+	@tests/tools/setup $(FIRMWARE_PACKAGES)
+	@$(MAKE) --no-print-directory -j$(JOBS) firmware-files
+	@tests/tools/firmware_report $(ELF) $(BOARD)
+
+flash: firmware ## put it on a NUCLEO-G474RE with openocd, st-flash or dfu-util (TOOL=one of them)
+	@tests/tools/flash $(ELF:.elf=)
+
+misra: ## MISRA C:2012 over the firmware and the board's port; docs/misra.md has the deviations
+	@tests/tools/setup cppcheck
+	@tests/tools/misra $(BUILD)
 
 lint: ## warnings as errors with gcc, clang and the ARM compiler; cppcheck; clang-tidy
 	@tests/tools/setup $(BUILD_PACKAGES) $(LINT_PACKAGES)

@@ -1,7 +1,7 @@
-/* Registers of the STM32G474 and of its Cortex-M4 core: the peripherals, registers and bits that this port uses, and no
- * others. Offsets are held by assertions at the end. What a register does is in ST's reference manual RM0440 and in ARM's
- * ARMv7-M architecture manual; what they are used for is in the driver of the same name. Not for host builds: reading
- * one of these there is a wild pointer. */
+/* Registers of the STM32G474 and of its Cortex-M4 core: the peripherals, registers and bits that this port
+ * uses, and no others. Offsets are held by assertions at the end. What a register does is in ST's reference
+ * manual RM0440 and in ARM's ARMv7-M architecture manual; what they are used for is in the driver of the same
+ * name. Not for host builds: reading one of these there is a wild pointer. */
 #ifndef TRIBEND_STM32G4_REGISTERS_H
 #define TRIBEND_STM32G4_REGISTERS_H
 
@@ -36,8 +36,6 @@ struct rcc_registers {
     reg32 csr;
 };
 #define RCC_ADDRESS 0x40021000u
-#define RCC_CR_HSION (1u << 8)
-#define RCC_CR_HSIRDY (1u << 10)
 #define RCC_CR_HSEON (1u << 16)
 #define RCC_CR_HSERDY (1u << 17)
 #define RCC_CR_CSSON (1u << 19)
@@ -73,7 +71,6 @@ struct rcc_registers {
 #define RCC_CCIPR_FDCANSEL_PCLK1 (2u << 24)
 #define RCC_CSR_RMVF (1u << 23)
 #define RCC_CSR_BORRSTF (1u << 27)
-#define RCC_CSR_SFTRSTF (1u << 28)
 #define RCC_CSR_IWDGRSTF (1u << 29)
 
 /* --- PWR: regulator range and supply supervision --- */
@@ -184,8 +181,9 @@ struct tim_registers {
 #define TIM_SR_UIF (1u << 0)
 #define TIM_EGR_UG (1u << 0)
 #define TIM_CCMR_LOW_PWM1 0x0068u  /* channel 1 or 3: PWM mode 1 (on below the compare value), preloaded */
-#define TIM_CCMR_HIGH_PWM1 0x6800u  /* channel 2 or 4 */
-#define TIM_CCMR_HIGH_PWM2 0x7800u  /* channel 4: on from the compare value on */
+#define TIM_CCMR_HIGH_PWM1 0x6800u /* channel 2 or 4 */
+#define TIM_CCMR_HIGH_PWM2 0x7800u /* channel 4: on from the compare value on */
+#define TIM_CCMR_PRELOADS 0x0808u
 #define TIM_CCER_CC1E (1u << 0)
 #define TIM_CCER_CC2E (1u << 4)
 #define TIM_CCER_CC3E (1u << 8)
@@ -217,11 +215,10 @@ struct adc_common_registers {
 #define ADC1_ADDRESS 0x50000000u
 #define ADC12_COMMON_ADDRESS 0x50000300u
 #define ADC_ISR_ADRDY (1u << 0)
-#define ADC_ISR_OVR (1u << 4)
 #define ADC_CR_ADEN (1u << 0)
 #define ADC_CR_ADSTART (1u << 2)
+#define ADC_CR_ADSTP (1u << 4)
 #define ADC_CR_ADVREGEN (1u << 28)
-#define ADC_CR_DEEPPWD (1u << 29)
 #define ADC_CR_ADCAL (1u << 31)
 #define ADC_CFGR_DMAEN (1u << 0)
 #define ADC_CFGR_DMACFG_CIRCULAR (1u << 1)
@@ -250,6 +247,7 @@ struct dma_registers {
 #define DMA1_ADDRESS 0x40020000u
 #define DMAMUX1_CHANNEL0_ADDRESS 0x40020800u
 #define DMA_ISR_TCIF1 (1u << 1)
+#define DMA_ISR_HTIF1 (1u << 2)
 #define DMA_ISR_TEIF1 (1u << 3)
 #define DMA_CCR_EN (1u << 0)
 #define DMA_CCR_CIRC (1u << 5)
@@ -484,44 +482,44 @@ struct nvic_registers {
 #define NVIC ((struct nvic_registers *)NVIC_ADDRESS)
 #define NVIC_PRIORITY ((volatile uint8_t *)NVIC_PRIORITY_ADDRESS)
 
-#define REGISTER_AT(block, name, offset) \
+#define REGISTER_AT(block, name, offset)                                                                     \
     _Static_assert(offsetof(struct block, name) == (offset), #block "." #name " is misplaced")
-REGISTER_AT(rcc_registers, cier, 0x18);
-REGISTER_AT(rcc_registers, ahb1enr, 0x48);
-REGISTER_AT(rcc_registers, apb2enr, 0x60);
-REGISTER_AT(rcc_registers, ccipr, 0x88);
-REGISTER_AT(rcc_registers, csr, 0x94);
-REGISTER_AT(pwr_registers, sr2, 0x14);
-REGISTER_AT(pwr_registers, cr5, 0x80);
-REGISTER_AT(flash_registers, keyr, 0x08);
-REGISTER_AT(flash_registers, optr, 0x20);
-REGISTER_AT(gpio_registers, afr, 0x20);
-REGISTER_AT(tim_registers, ccr, 0x34);
-REGISTER_AT(tim_registers, af1, 0x60);
-REGISTER_AT(adc_registers, sqr1, 0x30);
-REGISTER_AT(adc_registers, dr, 0x40);
-REGISTER_AT(adc_common_registers, ccr, 0x08);
-REGISTER_AT(dma_registers, cmar1, 0x14);
-REGISTER_AT(usart_registers, isr, 0x1c);
-REGISTER_AT(usart_registers, rdr, 0x24);
-REGISTER_AT(fdcan_registers, dbtp, 0x0c);
-REGISTER_AT(fdcan_registers, cccr, 0x18);
-REGISTER_AT(fdcan_registers, ecr, 0x40);
-REGISTER_AT(fdcan_registers, ir, 0x50);
-REGISTER_AT(fdcan_registers, rxgfc, 0x80);
-REGISTER_AT(fdcan_registers, rxf0s, 0x90);
-REGISTER_AT(fdcan_registers, txbc, 0xc0);
-REGISTER_AT(fdcan_registers, txbtie, 0xdc);
-REGISTER_AT(fdcan_memory, extended_filter, 0x70);
-REGISTER_AT(fdcan_memory, receive, 0xb0);
-REGISTER_AT(fdcan_memory, transmit_event, 0x260);
-REGISTER_AT(fdcan_memory, transmit, 0x278);
-REGISTER_AT(syscfg_registers, cfgr2, 0x1c);
-REGISTER_AT(exti_registers, pr1, 0x14);
-REGISTER_AT(dbgmcu_registers, apb2fz, 0x10);
-REGISTER_AT(scb_registers, shcsr, 0x24);
-REGISTER_AT(scb_registers, bfar, 0x38);
-REGISTER_AT(scb_registers, cpacr, 0x88);
-REGISTER_AT(nvic_registers, icer, 0x80);
+REGISTER_AT(rcc_registers, cier, 0x18u);
+REGISTER_AT(rcc_registers, ahb1enr, 0x48u);
+REGISTER_AT(rcc_registers, apb2enr, 0x60u);
+REGISTER_AT(rcc_registers, ccipr, 0x88u);
+REGISTER_AT(rcc_registers, csr, 0x94u);
+REGISTER_AT(pwr_registers, sr2, 0x14u);
+REGISTER_AT(pwr_registers, cr5, 0x80u);
+REGISTER_AT(flash_registers, keyr, 0x08u);
+REGISTER_AT(flash_registers, optr, 0x20u);
+REGISTER_AT(gpio_registers, afr, 0x20u);
+REGISTER_AT(tim_registers, ccr, 0x34u);
+REGISTER_AT(tim_registers, af1, 0x60u);
+REGISTER_AT(adc_registers, sqr1, 0x30u);
+REGISTER_AT(adc_registers, dr, 0x40u);
+REGISTER_AT(adc_common_registers, ccr, 0x08u);
+REGISTER_AT(dma_registers, cmar1, 0x14u);
+REGISTER_AT(usart_registers, isr, 0x1cu);
+REGISTER_AT(usart_registers, rdr, 0x24u);
+REGISTER_AT(fdcan_registers, dbtp, 0x0cu);
+REGISTER_AT(fdcan_registers, cccr, 0x18u);
+REGISTER_AT(fdcan_registers, ecr, 0x40u);
+REGISTER_AT(fdcan_registers, ir, 0x50u);
+REGISTER_AT(fdcan_registers, rxgfc, 0x80u);
+REGISTER_AT(fdcan_registers, rxf0s, 0x90u);
+REGISTER_AT(fdcan_registers, txbc, 0xc0u);
+REGISTER_AT(fdcan_registers, txbtie, 0xdcu);
+REGISTER_AT(fdcan_memory, extended_filter, 0x70u);
+REGISTER_AT(fdcan_memory, receive, 0xb0u);
+REGISTER_AT(fdcan_memory, transmit_event, 0x260u);
+REGISTER_AT(fdcan_memory, transmit, 0x278u);
+REGISTER_AT(syscfg_registers, cfgr2, 0x1cu);
+REGISTER_AT(exti_registers, pr1, 0x14u);
+REGISTER_AT(dbgmcu_registers, apb2fz, 0x10u);
+REGISTER_AT(scb_registers, shcsr, 0x24u);
+REGISTER_AT(scb_registers, bfar, 0x38u);
+REGISTER_AT(scb_registers, cpacr, 0x88u);
+REGISTER_AT(nvic_registers, icer, 0x80u);
 
 #endif

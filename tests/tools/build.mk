@@ -4,12 +4,16 @@ JOBS := $(shell nproc 2>/dev/null || echo 1)
 
 BUILD_PACKAGES := gcc libc6-dev pkg-config libgmsh-dev libsuitesparse-dev libgsl-dev libcyaml-dev libyaml-dev \
                   libopenmpi-dev openmpi-bin zlib1g-dev libjansson-dev libcmocka-dev calculix-ccx gnuplot-nox fonts-dejavu-core \
-                  $(EMULATOR_PACKAGES)
-EMULATOR_PACKAGES := libunicorn-dev qemu-system-arm gcc-arm-none-eabi
-LINT_PACKAGES  := clang clang-tidy cppcheck gcc-arm-none-eabi libnewlib-arm-none-eabi
+                  $(FIRMWARE_PACKAGES) $(EMULATOR_PACKAGES)
+FIRMWARE_PACKAGES := gcc-arm-none-eabi libnewlib-arm-none-eabi
+EMULATOR_PACKAGES := libunicorn-dev qemu-system-arm
+LINT_PACKAGES  := clang clang-tidy cppcheck
 
 # --- sources: a folder is a layer; arrows between layers are include paths below
 FIRMWARE_C := $(wildcard firmware/*.c firmware/*/*.c)
+BOARD_C    := $(wildcard hal/stm32g4/*.c)
+# what of the port has no register in it and is built for the host, too, to be tested and to replay recorded readings
+PORT_PURE_C := hal/stm32g4/conversions.c hal/stm32g4/crash_record.c
 # EXTRA_EFFECTS=FILE.c: effects of one's own, from anywhere, built into the simulator and the diagnosis
 SIM_C      := $(wildcard hal/sim/*.c hal/sim/effects/*.c) $(EXTRA_EFFECTS)
 EMULATOR_C := $(wildcard hal/emulator/*.c)
@@ -27,7 +31,7 @@ BLIND_SCORE_C := $(wildcard tests/gap/blind/blind_score*.c)
 SHARE_C := $(wildcard tests/gap/share/*.c)
 BLIND_MAIN := tests/gap/blind/blind_generate.c
 BLIND_C    := $(filter-out $(BLIND_SCORE_C) $(BLIND_MAIN),$(wildcard tests/gap/blind/blind_*.c))
-ALL_C      := $(wildcard docs/examples/*.c) $(FIRMWARE_C) $(SIM_C) $(EMULATOR_C) $(MODEL_C) $(TABLES_CLI_C) $(HOST_C) $(HOST_MAIN) $(EMULATED_C) $(TEST_C) $(BENCH_C) $(SUPPORT_C) $(SOLID_C) $(BLIND_C) $(BLIND_MAIN) $(BLIND_SCORE_C) $(SHARE_C)
+ALL_C      := $(wildcard docs/examples/*.c) $(FIRMWARE_C) $(SIM_C) $(EMULATOR_C) $(MODEL_C) $(TABLES_CLI_C) $(HOST_C) $(HOST_MAIN) $(EMULATED_C) $(TEST_C) $(BENCH_C) $(SUPPORT_C) $(SOLID_C) $(BLIND_C) $(BLIND_MAIN) $(BLIND_SCORE_C) $(SHARE_C) $(BOARD_C)
 ALL_H      := $(wildcard tests/gap/blind/*.h tests/model/ccx/*.h firmware/*.h firmware/*/*.h hal/*.h hal/*/*.h model/*/*.h host/*/*.h tests/*/*.h)
 
 # --- flags
@@ -114,37 +118,74 @@ $(BUILD)/tests/gap/blind/blind_score: $(call object,$(BLIND_SCORE_C))
 $(BUILD)/tests/gap/share/gap_share: $(call object,$(SHARE_C) $(wildcard model/sweep/*.c))
 	$(link) $(shell pkg-config --libs mpi-c 2>/dev/null) -lz -fopenmp
 $(BUILD)/tests/gap/test_blind_plant: $(call object,$(filter-out %/blind_truth.c,$(BLIND_C)))
+$(BUILD)/tests/board/test_conversions: $(call object,$(PORT_PURE_C))
 $(BUILD)/tests/%: $(BUILD)/tests/%.o $(SUPPORT_O) $(HOST_O) $(EMULATOR_O) $(SIM_O) $(FIRMWARE_O) $(SHARED_O)
 	$(link) -lcmocka $(EMULATOR_LIBS)
 
 $(SELFTEST_ELF): tests/hil/selftest/selftest.c tests/hil/selftest/selftest.ld
 	@mkdir -p $(@D)
-	$(if $(V),,@echo '  link $@';) arm-none-eabi-gcc -mcpu=cortex-m4 -mthumb -mfloat-abi=hard -mfpu=fpv4-sp-d16 -O2 -g -std=gnu11 \
-	    $(WARNINGS) $(EXACT) -ffreestanding -nostdlib -T tests/hil/selftest/selftest.ld $< -o $@
+	$(if $(V),,@echo '  link $@';) arm-none-eabi-gcc $(ARM_CORE) -O2 -g -std=gnu11 $(WARNINGS) $(EXACT) -ffreestanding -nostdlib \
+	    -T tests/hil/selftest/selftest.ld $< -o $@
 
 .SECONDARY:
 -include $(patsubst %.c,$(BUILD)/%.d,$(ALL_C))
 
+# --- firmware for the board: the same sources and hal/stm32g4, by the ARM compiler
+BOARD      := $(BUILD)/board
+BOARD_O    := $(patsubst %.c,$(BOARD)/%.o,$(FIRMWARE_C) $(BOARD_C)) $(BOARD)/hal/stm32g4/table_a.o
+BOARD_TABLE := tables/paper-semicircle.tbt
+BOARD_CC   := arm-none-eabi-gcc
+ARM_CORE   := -mcpu=cortex-m4 -mthumb -mfloat-abi=hard -mfpu=fpv4-sp-d16
+BOARD_FLAGS := $(ARM_CORE) -O2 -g -ffunction-sections -fdata-sections -fstack-usage
+BOARD_LINK := $(ARM_CORE) --specs=nano.specs -nostartfiles -T hal/stm32g4/stm32g474.ld -Wl,--gc-sections -Wl,--fatal-warnings
+ELF        := $(BUILD)/firmware/tribend.elf
+
+$(BOARD)/%.o: %.c
+	@mkdir -p $(@D)
+	$(say)$(BOARD_CC) $(BOARD_FLAGS) $(FIRMWARE_FLAGS) -MMD -MP -c $< -o $@
+$(BOARD)/hal/stm32g4/table_a.o: hal/stm32g4/table_a.S $(BOARD_TABLE)
+	@mkdir -p $(@D)
+	$(say)$(BOARD_CC) $(ARM_CORE) -DTABLE_A_FILE='"$(BOARD_TABLE)"' -c $< -o $@
+$(ELF): $(BOARD_O) hal/stm32g4/stm32g474.ld
+	@mkdir -p $(@D)
+	$(if $(V),,@echo '  link $@';) $(BOARD_CC) $(BOARD_LINK) -Wl,-Map=$(@:.elf=.map) $(BOARD_O) -o $@
+$(ELF:.elf=.hex): $(ELF)
+	@arm-none-eabi-objcopy -O ihex $< $@
+# from the hex file: of the ELF, objcopy would take an empty .data in RAM for the end of the image
+$(ELF:.elf=.bin): $(ELF:.elf=.hex)
+	@arm-none-eabi-objcopy -I ihex -O binary --gap-fill 0xff $< $@
+.PHONY: firmware-files
+firmware-files: $(ELF) $(ELF:.elf=.hex) $(ELF:.elf=.bin)
+-include $(patsubst %.c,$(BOARD)/%.d,$(FIRMWARE_C) $(BOARD_C))
+
 # --- lint: every compiler that the firmware must build with, then the analysers
-ARM_FLAGS := -mcpu=cortex-m4 -mthumb -mfloat-abi=hard -mfpu=fpv4-sp-d16 -Os
+ARM_FLAGS := $(ARM_CORE) -Os
 CPPCHECK_FLAGS := --enable=warning,performance,portability --inline-suppr --error-exitcode=1 --quiet \
                   --suppress=missingIncludeSystem --suppress=unknownMacro $(INCLUDES) --std=c11
-HOST_SIDE_C := $(filter-out $(FIRMWARE_C),$(ALL_C))
+HOST_SIDE_C := $(filter-out $(FIRMWARE_C) $(BOARD_C),$(ALL_C))
 
-.PHONY: lint-all lint-firmware lint-clang lint-cppcheck lint-tidy
-lint-all: lint-firmware lint-clang lint-cppcheck lint-tidy
+.PHONY: lint-all lint-firmware lint-board lint-clang lint-cppcheck lint-tidy lint-misra
+lint-all: lint-firmware lint-board lint-clang lint-cppcheck lint-tidy lint-misra
 	@echo "lint: clean ($(words $(ALL_C)) C files)"
 lint-firmware:
 	@set -e; for c in "gcc -O2" "clang -O2" "arm-none-eabi-gcc $(ARM_FLAGS)"; do for f in $(FIRMWARE_C); do \
 	    $$c $(FIRMWARE_FLAGS) -c $$f -o /dev/null || { echo "lint: $$c rejects $$f"; exit 1; }; done; done
+# The port has ARM assembler in it: ARM compilers alone.
+BOARD_CLANG := --target=arm-none-eabi $(ARM_CORE) -isystem /usr/lib/arm-none-eabi/include
+lint-board:
+	@set -e; for c in "clang $(BOARD_CLANG) -O2" "arm-none-eabi-gcc $(ARM_CORE) -O2"; do for f in $(BOARD_C); do \
+	    $$c $(FIRMWARE_FLAGS) -c $$f -o /dev/null || { echo "lint: $$c rejects $$f"; exit 1; }; done; done
+lint-misra:
+	@tests/tools/misra $(BUILD)
 lint-clang:
 	@set -e; for f in $(HOST_SIDE_C); do clang -O1 $(COMMON_FLAGS) $(MPI_FLAGS) -Wno-unknown-pragmas -Wno-source-uses-openmp \
 	    -fopenmp -fsyntax-only $$f; done
 lint-cppcheck:
-	@cppcheck -j$(JOBS) $(CPPCHECK_FLAGS) $(FIRMWARE_C) $(SIM_C) $(EMULATOR_C) $(MODEL_C) $(TABLES_CLI_C) $(HOST_C) $(HOST_MAIN) $(EMULATED_C)
+	@cppcheck -j$(JOBS) $(CPPCHECK_FLAGS) $(FIRMWARE_C) $(BOARD_C) $(SIM_C) $(EMULATOR_C) $(MODEL_C) $(TABLES_CLI_C) $(HOST_C) $(HOST_MAIN) $(EMULATED_C)
 # one file at a time: with several, clang-tidy 14 takes every va_list for uninitialised
 tidy = printf '%s\n' $(1) | xargs -P $(JOBS) -I FILE clang-tidy --quiet FILE -- $(2) 2>/dev/null
 lint-tidy:
 	@$(call tidy,$(FIRMWARE_C),$(FIRMWARE_FLAGS))
+	@$(call tidy,$(BOARD_C),$(FIRMWARE_FLAGS) $(BOARD_CLANG))
 	@$(call tidy,$(SIM_C) $(EMULATOR_C) $(MODEL_C) $(TABLES_CLI_C) $(HOST_C) $(HOST_MAIN) $(EMULATED_C),$(COMMON_FLAGS) $(MPI_FLAGS) \
 	    -Wno-unknown-pragmas -Wno-source-uses-openmp)
