@@ -4,8 +4,9 @@ JOBS := $(shell nproc 2>/dev/null || echo 1)
 
 BUILD_PACKAGES := gcc libc6-dev pkg-config libgmsh-dev libsuitesparse-dev libgsl-dev libcyaml-dev libyaml-dev \
                   libopenmpi-dev openmpi-bin zlib1g-dev libjansson-dev libcmocka-dev calculix-ccx gnuplot-nox fonts-dejavu-core \
-                  $(FIRMWARE_PACKAGES)
+                  $(FIRMWARE_PACKAGES) $(EMULATOR_PACKAGES)
 FIRMWARE_PACKAGES := gcc-arm-none-eabi libnewlib-arm-none-eabi
+EMULATOR_PACKAGES := libunicorn-dev qemu-system-arm
 LINT_PACKAGES  := clang clang-tidy cppcheck
 
 # --- sources: a folder is a layer; arrows between layers are include paths below
@@ -15,10 +16,12 @@ BOARD_C    := $(wildcard hal/stm32g4/*.c)
 PORT_PURE_C := hal/stm32g4/conversions.c hal/stm32g4/crash_record.c
 # EXTRA_EFFECTS=FILE.c: effects of one's own, from anywhere, built into the simulator and the diagnosis
 SIM_C      := $(wildcard hal/sim/*.c hal/sim/effects/*.c) $(EXTRA_EFFECTS)
+EMULATOR_C := $(wildcard hal/emulator/*.c)
 MODEL_C    := $(filter-out model/cli/%,$(wildcard model/*/*.c))
 SHARED_C    := $(wildcard model/units/*.c model/program/*.c) model/description/yaml_file.c model/description/calibration_file.c
 TABLES_CLI_C := $(wildcard model/cli/*.c)
-HOST_C     := $(filter-out host/cli/main.c,$(wildcard host/*/*.c))
+HOST_C     := $(filter-out host/cli/main.c host/board/%,$(wildcard host/*/*.c))
+EMULATED_C := $(wildcard host/board/*.c)
 HOST_MAIN  := host/cli/main.c
 TEST_C     := $(wildcard tests/*/test_*.c)
 BENCH_C    := $(wildcard tests/bench/bench_*.c)
@@ -28,7 +31,7 @@ BLIND_SCORE_C := $(wildcard tests/gap/blind/blind_score*.c)
 SHARE_C := $(wildcard tests/gap/share/*.c)
 BLIND_MAIN := tests/gap/blind/blind_generate.c
 BLIND_C    := $(filter-out $(BLIND_SCORE_C) $(BLIND_MAIN),$(wildcard tests/gap/blind/blind_*.c))
-ALL_C      := $(wildcard docs/examples/*.c) $(FIRMWARE_C) $(SIM_C) $(MODEL_C) $(TABLES_CLI_C) $(HOST_C) $(HOST_MAIN) $(TEST_C) $(BENCH_C) $(SUPPORT_C) $(SOLID_C) $(BLIND_C) $(BLIND_MAIN) $(BLIND_SCORE_C) $(SHARE_C) $(BOARD_C)
+ALL_C      := $(wildcard docs/examples/*.c) $(FIRMWARE_C) $(SIM_C) $(EMULATOR_C) $(MODEL_C) $(TABLES_CLI_C) $(HOST_C) $(HOST_MAIN) $(EMULATED_C) $(TEST_C) $(BENCH_C) $(SUPPORT_C) $(SOLID_C) $(BLIND_C) $(BLIND_MAIN) $(BLIND_SCORE_C) $(SHARE_C) $(BOARD_C)
 ALL_H      := $(wildcard tests/gap/blind/*.h tests/model/ccx/*.h firmware/*.h firmware/*/*.h hal/*.h hal/*/*.h model/*/*.h host/*/*.h tests/*/*.h)
 
 # --- flags
@@ -48,17 +51,22 @@ MODEL_FLAGS    := $(COMMON_FLAGS) -fopenmp $(MPI_FLAGS)
 object = $(patsubst %.c,$(BUILD)/%.o,$(1))
 FIRMWARE_O := $(call object,$(FIRMWARE_C))
 SIM_O      := $(call object,$(SIM_C))
+EMULATOR_O := $(call object,$(EMULATOR_C))
 MODEL_O    := $(call object,$(MODEL_C))
 SHARED_O    := $(call object,$(SHARED_C))
 TABLES_CLI_O := $(call object,$(TABLES_CLI_C))
 HOST_O     := $(call object,$(HOST_C))
+EMULATED_O := $(call object,$(EMULATED_C))
 SUPPORT_O  := $(call object,$(SUPPORT_C))
 
-PROGRAMS := $(BUILD)/tribend-tables $(BUILD)/tribend
+PROGRAMS := $(BUILD)/tribend-tables $(BUILD)/tribend $(BUILD)/tribend-board
 TEST_PROGRAMS  := $(patsubst %.c,$(BUILD)/%,$(TEST_C))
 BLIND_PROGRAMS := $(BUILD)/tests/gap/blind/blind_generate $(BUILD)/tests/gap/blind/blind_score $(BUILD)/tests/gap/share/gap_share
+# the emulated core's own test program
+SELFTEST_ELF := $(BUILD)/tests/hil/selftest.elf
 BENCH_PROGRAMS := $(patsubst %.c,$(BUILD)/%,$(BENCH_C))
 
+EMULATOR_LIBS = -lunicorn $(HOST_LIBS)
 HOST_LIBS  := -ljansson -lcyaml -lyaml -fopenmp -lm
 MODEL_LIBS := $(shell pkg-config --libs mpi-c 2>/dev/null) -lgmsh -lcholmod -lgsl -lgslcblas -lcyaml -lyaml -lz -fopenmp -lm
 
@@ -87,9 +95,12 @@ $(BUILD)/tribend-tables: $(TABLES_CLI_O) $(MODEL_O) $(FIRMWARE_O)
 	$(link) $(MODEL_LIBS)
 $(BUILD)/tribend: $(call object,$(HOST_MAIN)) $(HOST_O) $(SIM_O) $(FIRMWARE_O) $(SHARED_O)
 	$(link) $(HOST_LIBS)
+# Apart from `tribend`, for libunicorn is under the GPL.
+$(BUILD)/tribend-board: $(EMULATED_O) $(HOST_O) $(EMULATOR_O) $(SIM_O) $(FIRMWARE_O) $(SHARED_O)
+	$(link) $(EMULATOR_LIBS)
 
 .PHONY: test-programs bench-programs
-test-programs: $(TEST_PROGRAMS) $(BLIND_PROGRAMS)
+test-programs: $(TEST_PROGRAMS) $(BLIND_PROGRAMS) $(SELFTEST_ELF)
 bench-programs: $(BENCH_PROGRAMS)
 
 # Tests of the model link its libraries; the others link what `tribend` links.
@@ -108,8 +119,13 @@ $(BUILD)/tests/gap/share/gap_share: $(call object,$(SHARE_C) $(wildcard model/sw
 	$(link) $(shell pkg-config --libs mpi-c 2>/dev/null) -lz -fopenmp
 $(BUILD)/tests/gap/test_blind_plant: $(call object,$(filter-out %/blind_truth.c,$(BLIND_C)))
 $(BUILD)/tests/board/test_conversions: $(call object,$(PORT_PURE_C))
-$(BUILD)/tests/%: $(BUILD)/tests/%.o $(SUPPORT_O) $(HOST_O) $(SIM_O) $(FIRMWARE_O) $(SHARED_O)
-	$(link) -lcmocka $(HOST_LIBS)
+$(BUILD)/tests/%: $(BUILD)/tests/%.o $(SUPPORT_O) $(HOST_O) $(EMULATOR_O) $(SIM_O) $(FIRMWARE_O) $(SHARED_O)
+	$(link) -lcmocka $(EMULATOR_LIBS)
+
+$(SELFTEST_ELF): tests/hil/selftest/selftest.c tests/hil/selftest/selftest.ld
+	@mkdir -p $(@D)
+	$(if $(V),,@echo '  link $@';) arm-none-eabi-gcc $(ARM_CORE) -O2 -g -std=gnu11 $(WARNINGS) $(EXACT) -ffreestanding -nostdlib \
+	    -T tests/hil/selftest/selftest.ld $< -o $@
 
 .SECONDARY:
 -include $(patsubst %.c,$(BUILD)/%.d,$(ALL_C))
@@ -165,11 +181,11 @@ lint-clang:
 	@set -e; for f in $(HOST_SIDE_C); do clang -O1 $(COMMON_FLAGS) $(MPI_FLAGS) -Wno-unknown-pragmas -Wno-source-uses-openmp \
 	    -fopenmp -fsyntax-only $$f; done
 lint-cppcheck:
-	@cppcheck -j$(JOBS) $(CPPCHECK_FLAGS) $(FIRMWARE_C) $(BOARD_C) $(SIM_C) $(MODEL_C) $(TABLES_CLI_C) $(HOST_C) $(HOST_MAIN)
+	@cppcheck -j$(JOBS) $(CPPCHECK_FLAGS) $(FIRMWARE_C) $(BOARD_C) $(SIM_C) $(EMULATOR_C) $(MODEL_C) $(TABLES_CLI_C) $(HOST_C) $(HOST_MAIN) $(EMULATED_C)
 # one file at a time: with several, clang-tidy 14 takes every va_list for uninitialised
 tidy = printf '%s\n' $(1) | xargs -P $(JOBS) -I FILE clang-tidy --quiet FILE -- $(2) 2>/dev/null
 lint-tidy:
 	@$(call tidy,$(FIRMWARE_C),$(FIRMWARE_FLAGS))
 	@$(call tidy,$(BOARD_C),$(FIRMWARE_FLAGS) $(BOARD_CLANG))
-	@$(call tidy,$(SIM_C) $(MODEL_C) $(TABLES_CLI_C) $(HOST_C) $(HOST_MAIN),$(COMMON_FLAGS) $(MPI_FLAGS) \
+	@$(call tidy,$(SIM_C) $(EMULATOR_C) $(MODEL_C) $(TABLES_CLI_C) $(HOST_C) $(HOST_MAIN) $(EMULATED_C),$(COMMON_FLAGS) $(MPI_FLAGS) \
 	    -Wno-unknown-pragmas -Wno-source-uses-openmp)
