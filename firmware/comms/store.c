@@ -97,27 +97,52 @@ static bool read_commit(const uint8_t *slot, uint32_t area_bytes, uint32_t *sequ
     return get_u32(slot, at + 16u) == crc && get_u32(slot, at + 20u) == ~crc && *bytes <= at;
 }
 
-static bool find_table_in(struct store *store, enum hal_storage_area slot, uint32_t *sequence) {
-    uint32_t area_bytes = 0u, bytes = 0u, image_crc = 0u;
-    const uint8_t *image = map(store, slot, &area_bytes);
-    if (!read_commit(image, area_bytes, sequence, &bytes, &image_crc)) {
-        return false;
+/* A slot's commit record, and whether the table that it commits is sound. */
+struct slot {
+    bool committed;
+    bool sound;
+    uint32_t sequence;
+    uint32_t bytes;
+};
+
+static void look_at_slot(struct store *store, enum hal_storage_area area, struct slot *slot) {
+    uint32_t area_bytes = 0u, image_crc = 0u;
+    const uint8_t *image = map(store, area, &area_bytes);
+    *slot = (struct slot){.committed = false};
+    slot->committed = read_commit(image, area_bytes, &slot->sequence, &slot->bytes, &image_crc);
+    if (!slot->committed) {
+        *slot = (struct slot){.committed = false}; /* what was read of it means nothing */
     }
-    /* even a record whose table is damaged has had its sequence */
-    if (is_newer(*sequence, store->table_sequence)) {
-        store->table_sequence = *sequence;
-    }
-    return crc32_update(0u, image, bytes) == image_crc &&
-           bend_table_open(&store->buffer.table, image, bytes, NULL) == BEND_TABLE_OK;
+    slot->sound = slot->committed && crc32_update(0u, image, slot->bytes) == image_crc &&
+                  bend_table_open(&store->buffer.table, image, slot->bytes, NULL) == BEND_TABLE_OK;
 }
 
+/* As the firmware's build leaves slot A: a table, and no commit record in either slot. */
+static bool find_flashed_table(struct store *store, struct slot *slot) {
+    uint32_t area_bytes = 0u;
+    const uint8_t *image = map(store, HAL_STORAGE_TABLE_A, &area_bytes);
+    if (image == NULL || commit_offset(area_bytes) < BEND_TABLE_HEADER_BYTES) {
+        return false;
+    }
+    slot->bytes = get_u32(image, BEND_TABLE_OFFSET_IMAGE_BYTES);
+    return slot->bytes <= commit_offset(area_bytes) &&
+           bend_table_open(&store->buffer.table, image, slot->bytes, NULL) == BEND_TABLE_OK;
+}
+
+/* Even a record whose table is damaged has had its sequence, and keeps what was never committed from being
+ * used. */
 static void find_table(struct store *store) {
-    uint32_t sequence_a = 0u, sequence_b = 0u;
-    const bool in_a = find_table_in(store, HAL_STORAGE_TABLE_A, &sequence_a);
-    const bool in_b = find_table_in(store, HAL_STORAGE_TABLE_B, &sequence_b);
-    store->table_found = in_a || in_b;
-    store->table_slot =
-        in_b && (!in_a || is_newer(sequence_b, sequence_a)) ? HAL_STORAGE_TABLE_B : HAL_STORAGE_TABLE_A;
+    struct slot a, b;
+    look_at_slot(store, HAL_STORAGE_TABLE_A, &a);
+    look_at_slot(store, HAL_STORAGE_TABLE_B, &b);
+    if (!a.committed && !b.committed) {
+        a.sound = find_flashed_table(store, &a);
+    }
+    const bool takes_b = b.sound && (!a.sound || is_newer(b.sequence, a.sequence));
+    store->table_found = a.sound || b.sound;
+    store->table_slot = takes_b ? HAL_STORAGE_TABLE_B : HAL_STORAGE_TABLE_A;
+    store->table_bytes = takes_b ? b.bytes : a.bytes;
+    store->table_sequence = is_newer(b.sequence, a.sequence) ? b.sequence : a.sequence;
 }
 
 static bool is_usable(const struct hal_storage *storage) {
@@ -133,12 +158,10 @@ void store_init(struct store *store, const struct hal_storage *storage) {
 }
 
 bool store_table(const struct store *store, const uint8_t **image, uint32_t *bytes) {
-    uint32_t area_bytes = 0u, sequence = 0u, image_crc = 0u;
-    if (!store->table_found) {
-        return false;
-    }
-    *image = map(store, store->table_slot, &area_bytes);
-    return read_commit(*image, area_bytes, &sequence, bytes, &image_crc);
+    uint32_t area_bytes = 0u;
+    *image = store->table_found ? map(store, store->table_slot, &area_bytes) : NULL;
+    *bytes = store->table_bytes;
+    return *image != NULL;
 }
 
 enum parameters_image_status store_parameters(const struct store *store, const struct bend_table *table,

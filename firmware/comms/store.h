@@ -100,7 +100,8 @@ struct store {
     enum hal_storage_area parameters_area; /* of the newest image */
     enum hal_storage_area table_slot;      /* of the table that runs */
     uint32_t parameters_sequence;
-    uint32_t table_sequence;
+    uint32_t table_bytes;
+    uint32_t table_sequence; /* the highest that was committed */
     /* the work under way, see store.c */
     enum store_phase phase;
     bool started;
