@@ -10,6 +10,10 @@ void app_init(struct app *app, const struct hal *hal, const struct bend_table *t
     app->hal = hal;
     app->pending = (struct controller_command){.kind = COMMAND_NONE};
     app->hal_errors = 0u;
+    app->bus_off = false;
+    app->error_passive = false;
+    app->input = (struct controller_input){.time_us = 0};
+    app->output = (struct controller_output){.valves_enabled = false};
 }
 
 void app_command(struct app *app, const struct controller_command *command) {
@@ -49,18 +53,22 @@ static void read_pressures(struct app *app, struct controller_input *input) {
 }
 
 bool app_step(struct app *app) {
-    struct controller_input input = {.time_us = app->hal->time_us(app->hal->context), .command = app->pending};
-    struct controller_output output;
+    struct controller_input *input = &app->input;
+    const struct controller_output *output = &app->output;
     struct hal_outputs outputs;
+    *input = (struct controller_input){.time_us = app->hal->time_us(app->hal->context),
+                                       .bus_off = app->bus_off,
+                                       .error_passive = app->error_passive,
+                                       .command = app->pending};
     app->pending.kind = COMMAND_NONE;
-    read_pressures(app, &input);
-    read_tip(app, &input);
-    controller_step(&app->controller, &input, &output);
+    read_pressures(app, input);
+    read_tip(app, input);
+    controller_step(&app->controller, input, &app->output);
     for (uint32_t c = 0; c < 3u; c++) {
-        outputs.duty[c] = output.duty[c];
+        outputs.duty[c] = output->duty[c];
     }
-    outputs.valves_enabled = output.valves_enabled;
-    outputs.supply_enabled = output.supply_enabled;
+    outputs.valves_enabled = output->valves_enabled;
+    outputs.supply_enabled = output->supply_enabled;
     if (!app->hal->write_outputs(app->hal->context, &outputs)) {
         app->hal_errors++;
     }

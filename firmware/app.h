@@ -10,6 +10,10 @@ struct app {
     const struct hal *hal;
     struct controller_command pending; /* set by app_command, consumed by the next step */
     uint32_t hal_errors;               /* reads or writes that the hal refused */
+    bool bus_off;                      /* of the bus that commands come over; set by the node before each step */
+    bool error_passive;
+    struct controller_input input; /* of the last step, for reports */
+    struct controller_output output;
 };
 
 void app_init(struct app *app, const struct hal *hal, const struct bend_table *table,

@@ -28,6 +28,7 @@ static bool is_finite(float value) {
     return value - value == 0.0f;
 }
 
+/* All of the header but the CRC. */
 static enum bend_table_status check_frame(const uint8_t *image, size_t size) {
     if (size < BEND_TABLE_HEADER_BYTES) {
         return BEND_TABLE_TOO_SHORT;
@@ -45,11 +46,12 @@ static enum bend_table_status check_frame(const uint8_t *image, size_t size) {
     if (size > image_bytes || read_u16(image, BEND_TABLE_OFFSET_HEADER_BYTES) != BEND_TABLE_HEADER_BYTES) {
         return BEND_TABLE_BAD_SIZE;
     }
-    const size_t covered = BEND_TABLE_OFFSET_CRC + 4u;
-    if (crc32_update(0u, image + covered, size - covered) != read_u32(image, BEND_TABLE_OFFSET_CRC)) {
-        return BEND_TABLE_BAD_CRC;
-    }
     return BEND_TABLE_OK;
+}
+
+static bool crc_holds(const uint8_t *image, size_t size) {
+    const size_t covered = BEND_TABLE_OFFSET_CRC + 4u;
+    return crc32_update(0u, image + covered, size - covered) == read_u32(image, BEND_TABLE_OFFSET_CRC);
 }
 
 /* Nodes and bytes of the grid whose node counts stand at `offset`. */
@@ -68,7 +70,7 @@ static enum bend_table_status measure_grid(struct bend_table *table, const uint8
     return BEND_TABLE_OK;
 }
 
-static enum bend_table_status bind_grid(struct bend_table *table, const uint8_t *grid) {
+static void bind_grid(struct bend_table *table, const uint8_t *grid) {
     const size_t nodes = (size_t)table->nodes[0] * table->nodes[1] * table->nodes[2];
     const float *next = (const float *)(const void *)grid;
     for (size_t a = 0; a < 3; a++) {
@@ -77,15 +79,9 @@ static enum bend_table_status bind_grid(struct bend_table *table, const uint8_t 
     }
     for (size_t c = 0; c < BEND_TABLE_CHANNEL_COUNT; c++) {
         table->channel[c] = next;
-        for (size_t i = 0; i < nodes; i++) {
-            if (!is_finite(next[i])) {
-                return BEND_TABLE_BAD_VALUE;
-            }
-        }
         next += nodes;
     }
     table->tag = (const uint8_t *)(const void *)next;
-    return BEND_TABLE_OK;
 }
 
 static enum bend_table_status read_module(struct bend_table *table, const uint8_t *image) {
@@ -157,9 +153,7 @@ static enum bend_table_status read_grid(struct bend_table *table, const uint8_t 
         status = BEND_TABLE_BAD_SIZE;
     }
     if (status == BEND_TABLE_OK) {
-        status = bind_grid(table, image + start);
-    }
-    if (status == BEND_TABLE_OK) {
+        bind_grid(table, image + start);
         status = bind_axes(table, offset == BEND_TABLE_OFFSET_BALLOONED);
     }
     return status;
@@ -206,25 +200,67 @@ static enum bend_table_status read_grids(struct bend_table *table, const uint8_t
     return status;
 }
 
-enum bend_table_status bend_table_open(struct bend_table *table, const void *image, size_t size,
-                                       const char *module_name) {
-    (void)memset(table, 0, sizeof *table);
+static enum bend_table_status check_name(const struct bend_table *table, const char *module_name) {
+    const bool other =
+        module_name != NULL && strncmp(module_name, table->module.name, BEND_TABLE_NAME_BYTES) != 0;
+    return other ? BEND_TABLE_WRONG_MODULE : BEND_TABLE_OK;
+}
+
+static enum bend_table_status check_image(const void *image, size_t size) {
     if (image == NULL) {
         return BEND_TABLE_TOO_SHORT;
     }
     if ((uintptr_t)image % sizeof(float) != 0u) {
         return BEND_TABLE_MISALIGNED;
     }
-    enum bend_table_status status = check_frame(image, size);
+    return check_frame(image, size);
+}
+
+enum bend_table_status bend_table_bind(struct bend_table *table, const void *image, size_t size,
+                                       const char *module_name) {
+    (void)memset(table, 0, sizeof *table);
+    enum bend_table_status status = check_image(image, size);
     if (status == BEND_TABLE_OK) {
         status = read_module(table, image);
     }
     if (status == BEND_TABLE_OK) {
         status = read_grids(table, image, size);
     }
-    if (status == BEND_TABLE_OK && module_name != NULL &&
-        strncmp(module_name, table->module.name, BEND_TABLE_NAME_BYTES) != 0) {
-        status = BEND_TABLE_WRONG_MODULE;
+    return status == BEND_TABLE_OK ? check_name(table, module_name) : status;
+}
+
+/* Where the axes and channels of the grid that starts at `start` end, its node counts standing at `offset`. */
+static size_t end_of_values(const uint8_t *image, size_t offset, size_t start) {
+    const size_t n1 = read_u32(image, offset), n2 = read_u32(image, offset + 4u), n3 = read_u32(image, offset + 8u);
+    return start + sizeof(float) * (n1 + n2 + n3 + BEND_TABLE_CHANNEL_COUNT * n1 * n2 * n3);
+}
+
+bool bend_table_is_finite(const struct bend_table *table, uint32_t from, uint32_t to) {
+    const uint8_t *image = table->image;
+    const size_t second = BEND_TABLE_HEADER_BYTES + (size_t)table->grid_bytes;
+    const size_t first_end = end_of_values(image, BEND_TABLE_OFFSET_NODES, BEND_TABLE_HEADER_BYTES);
+    const size_t second_end = has_ballooned(image) ? end_of_values(image, BEND_TABLE_OFFSET_BALLOONED, second) : second;
+    bool finite = true;
+    for (size_t at = from; at < to; at += sizeof(float)) {
+        const bool is_value = (at >= BEND_TABLE_HEADER_BYTES && at < first_end) || (at >= second && at < second_end);
+        float value = 0.0f;
+        (void)memcpy(&value, image + at, sizeof value);
+        finite = finite && (!is_value || is_finite(value));
+    }
+    return finite;
+}
+
+enum bend_table_status bend_table_open(struct bend_table *table, const void *image, size_t size,
+                                       const char *module_name) {
+    enum bend_table_status status = check_image(image, size);
+    if (status == BEND_TABLE_OK && !crc_holds(image, size)) {
+        status = BEND_TABLE_BAD_CRC;
+    }
+    if (status == BEND_TABLE_OK) {
+        status = bend_table_bind(table, image, size, module_name);
+    }
+    if (status == BEND_TABLE_OK && !bend_table_is_finite(table, 0u, table->image_bytes)) {
+        status = BEND_TABLE_BAD_VALUE;
     }
     return status;
 }

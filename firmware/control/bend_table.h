@@ -101,6 +101,12 @@ struct bend_table_stencil {
  * Anything but BEND_TABLE_OK leaves `table` unusable. */
 enum bend_table_status bend_table_open(struct bend_table *table, const void *image, size_t size,
                                        const char *module_name);
+/* The same but for what takes a look at every byte: neither the CRC nor single numbers are checked. For an image that is
+ * checked a slice at a time. */
+enum bend_table_status bend_table_bind(struct bend_table *table, const void *image, size_t size,
+                                       const char *module_name);
+/* Every number of a bound table's image within bytes [from, to), multiples of four, is finite. */
+bool bend_table_is_finite(const struct bend_table *table, uint32_t from, uint32_t to);
 /* The states of one chamber that has ballooned, both the unstable ones and those of the second stable branch, as a table
  * of its own: axis 1 is that chamber's volume (m2, first above 0) in place of its pressure, and BEND_TABLE_PRESSURE_1 its
  * pressure in place of its volume. For chamber 2 or 3, turn by one or two thirds and shift the pressures alike.

@@ -22,20 +22,27 @@ void controller_default_parameters(struct controller_parameters *parameters, con
     calibration_none(&parameters->calibration);
 }
 
-void controller_init(struct controller *controller, const struct bend_table *table,
-                     const struct controller_parameters *parameters) {
-    *controller = (struct controller){.table = table, .parameters = *parameters};
-    supervisor_init(&controller->supervisor);
-    limits_init(&controller->limits);
-    tip_loop_init(&controller->tip_loop);
-    gap_monitor_init(&controller->gap_monitor);
+void controller_set_parameters(struct controller *controller, const struct controller_parameters *parameters) {
+    controller->parameters = *parameters;
     struct controller_calibration *calibration = &controller->parameters.calibration;
     controller->status.calibration_limited = calibration_limit(calibration);
     calibration_frames_of(calibration, &controller->frames);
     controller->creeps = calibration_creeps(calibration);
     for (uint32_t c = 0; c < 3u; c++) {
-        pressure_loop_init(&controller->pressure_loop[c]);
         calibration_apply(calibration, c, &parameters->pressure_loop, &controller->loop_parameters[c]);
+    }
+}
+
+void controller_init(struct controller *controller, const struct bend_table *table,
+                     const struct controller_parameters *parameters) {
+    *controller = (struct controller){.table = table};
+    supervisor_init(&controller->supervisor);
+    limits_init(&controller->limits);
+    tip_loop_init(&controller->tip_loop);
+    gap_monitor_init(&controller->gap_monitor);
+    controller_set_parameters(controller, parameters);
+    for (uint32_t c = 0; c < 3u; c++) {
+        pressure_loop_init(&controller->pressure_loop[c]);
         controller->capacity_m3[c] = controller->loop_parameters[c].nominal_capacity_m3;
     }
     controller->tip_lost = true;

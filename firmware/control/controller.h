@@ -59,6 +59,8 @@ struct controller_input {
     float tip_quaternion[4]; /* w, x, y, z */
     uint16_t tip_quality;
     uint16_t tip_status;
+    bool bus_off; /* of the bus that commands come over */
+    bool error_passive;
     struct controller_command command;
 };
 
@@ -117,6 +119,8 @@ void controller_default_parameters(struct controller_parameters *parameters, con
 /* `table` (may be NULL) and `parameters` are kept: the table by pointer, the parameters by value. */
 void controller_init(struct controller *controller, const struct bend_table *table,
                      const struct controller_parameters *parameters);
+/* Other parameters from now on; only while vented, but for those of parameters.def that say otherwise. */
+void controller_set_parameters(struct controller *controller, const struct controller_parameters *parameters);
 /* One control step; called every CONTROLLER_STEP_US. Always fills `output`. */
 void controller_step(struct controller *controller, const struct controller_input *input,
                      struct controller_output *output);
