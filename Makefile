@@ -14,7 +14,7 @@ SHELL    := /bin/bash
 MAKEFLAGS += --no-builtin-rules
 include tests/tools/build.mk
 
-.PHONY: help setup all demo test bench gap-check firmware flash misra lint format tables clean
+.PHONY: help setup all demo test bench gap-check firmware flash misra campaign docs-faults lint format tables clean
 
 help: ## list these targets
 	@grep -hE '^[a-z-]+:.*## ' Makefile | awk -F ':.*## ' '{printf "  make %-10s %s\n", $$1, $$2}'
@@ -51,6 +51,14 @@ flash: firmware ## put it on a NUCLEO-G474RE with openocd, st-flash or dfu-util 
 misra: ## MISRA C:2012 over the firmware and the board's port; docs/misra.md has the deviations
 	@tests/tools/setup cppcheck
 	@tests/tools/misra $(BUILD)
+
+campaign: setup ## break the simulated board in every way, alone and in pairs (MISSIONS=n SEED=n FAULT=text CSV=file)
+	@$(MAKE) --no-print-directory -j$(JOBS) $(BUILD)/tests/campaign/campaign
+	@$(BUILD)/tests/campaign/campaign $(if $(MISSIONS),-n $(MISSIONS)) $(if $(SEED),-s $(SEED)) $(if $(FAULT),-f '$(FAULT)') \
+	    -o $(if $(CSV),$(CSV),$(BUILD)/campaign.csv)
+
+docs-faults: $(BUILD)/tests/docs/faults_page ## write docs/faults.md from firmware/safety/faults.def
+	@$(BUILD)/tests/docs/faults_page >docs/faults.md
 
 lint: ## warnings as errors with gcc, clang and the ARM compiler; cppcheck; clang-tidy
 	@tests/tools/setup $(BUILD_PACKAGES) $(LINT_PACKAGES)

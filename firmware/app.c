@@ -12,6 +12,8 @@ void app_init(struct app *app, const struct hal *hal, const struct bend_table *t
     app->hal_errors = 0u;
     app->bus_off = false;
     app->error_passive = false;
+    app->outputs_refused = false;
+    app->parameters_corrupt = false;
     app->input = (struct controller_input){.time_us = 0};
     app->output = (struct controller_output){.valves_enabled = false};
 }
@@ -59,18 +61,22 @@ bool app_step(struct app *app) {
     *input = (struct controller_input){.time_us = app->hal->time_us(app->hal->context),
                                        .bus_off = app->bus_off,
                                        .error_passive = app->error_passive,
+                                       .outputs_refused = app->outputs_refused,
+                                       .parameters_corrupt = app->parameters_corrupt,
                                        .command = app->pending};
     app->pending.kind = COMMAND_NONE;
     read_pressures(app, input);
     read_tip(app, input);
+    if (app->hal->read_health != NULL) {
+        app->hal->read_health(app->hal->context, &input->health);
+    }
     controller_step(&app->controller, input, &app->output);
     for (uint32_t c = 0; c < 3u; c++) {
         outputs.duty[c] = output->duty[c];
     }
     outputs.valves_enabled = output->valves_enabled;
     outputs.supply_enabled = output->supply_enabled;
-    if (!app->hal->write_outputs(app->hal->context, &outputs)) {
-        app->hal_errors++;
-    }
+    app->outputs_refused = !app->hal->write_outputs(app->hal->context, &outputs);
+    app->hal_errors += app->outputs_refused ? 1u : 0u;
     return app->controller.status.state != SUPERVISOR_FAULT;
 }

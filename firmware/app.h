@@ -12,6 +12,8 @@ struct app {
     uint32_t hal_errors;               /* reads or writes that the hal refused */
     bool bus_off;                      /* of the bus that commands come over; set by the node before each step */
     bool error_passive;
+    bool outputs_refused;          /* by the last step's write */
+    bool parameters_corrupt;       /* the stored ones failed their check; set by who reads them */
     struct controller_input input; /* of the last step, for reports */
     struct controller_output output;
 };

@@ -49,7 +49,8 @@ struct hal {
     /* The next tip sample that arrived since the last call; false: none. Bounded by the caller to a few a
      * step. */
     bool (*read_tip)(void *context, struct hal_tip_sample *sample);
-    /* False: an output could not be set. */
+    /* False: an output could not be set. A board feeds its watchdog here, and only when all were set: what cannot be set
+     * ends in a reset, which vents. */
     bool (*write_outputs)(void *context, const struct hal_outputs *outputs);
     /* NULL: a board that has nothing to say of itself. */
     void (*read_health)(void *context, struct hal_health *health);

@@ -567,6 +567,7 @@ static bool move(struct node *node, enum message_id id, uint8_t sequence,
         return false;
     }
     node->last = *given;
+    node->last.said_again = true;
     command(node, given);
     return true;
 }
@@ -908,6 +909,7 @@ void node_init(struct node *node, const struct node_setup *setup) {
     (void)store_parameters(&node->store, table_of(node), &node->parameters, &node->parameters_report);
     node->node_id = node->parameters.node.node_id;
     app_init(&node->app, setup->hal, table_of(node), &node->parameters.controller);
+    node->app.parameters_corrupt = store_parameters_lost(&node->store);
     use_parameters(node);
     for (uint32_t r = 0; r < (uint32_t)REPORT_COUNT; r++) {
         const struct message_row *row = message_row(reports[r].id);

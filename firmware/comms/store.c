@@ -177,6 +177,21 @@ enum parameters_image_status store_parameters(const struct store *store, const s
     return parameters_read(parameters, table, image, area_bytes, report);
 }
 
+static bool is_blank(const struct store *store, enum hal_storage_area area) {
+    uint32_t area_bytes = 0u;
+    const uint8_t *image = map(store, area, &area_bytes);
+    bool blank = true;
+    for (uint32_t i = 0; image != NULL && i < PARAMETERS_IMAGE_HEADER_BYTES && i < area_bytes; i++) {
+        blank = blank && image[i] == 0xffu;
+    }
+    return blank;
+}
+
+bool store_parameters_lost(const struct store *store) {
+    return !store->parameters_found && !is_blank(store, HAL_STORAGE_PARAMETERS_A) &&
+           !is_blank(store, HAL_STORAGE_PARAMETERS_B);
+}
+
 void store_set_running(struct store *store, const struct bend_table *running) {
     store->running = running;
 }

@@ -18,7 +18,7 @@
 #include "comms/parameters.h"
 #include "hal.h"
 
-#define STORE_BUFFER_BYTES 1024u
+#define STORE_BUFFER_BYTES 1536u
 #define STORE_COMMIT_BYTES 24u
 #define STORE_PATIENCE_STEPS 2000u /* without data, or with storage that does not answer */
 
@@ -139,6 +139,8 @@ bool store_table(const struct store *store, const uint8_t **image, uint32_t *byt
 enum parameters_image_status store_parameters(const struct store *store, const struct bend_table *table,
                                               struct parameters *parameters,
                                               struct parameters_image_report *report);
+/* Both places hold something, and neither is whole: parameters were there and are lost. No power failure makes that. */
+bool store_parameters_lost(const struct store *store);
 /* The table that the controller runs (NULL: none), for what depends on it. */
 void store_set_running(struct store *store, const struct bend_table *running);
 

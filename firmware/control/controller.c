@@ -6,10 +6,12 @@
 
 #include <stddef.h>
 
+#include "control/crc32.h"
 #include "control/real_math.h"
 
 #define SUPPLY_LEAST_PA 1000.0f
 #define SELFTEST_PRESSURE_PA 2000.0f
+#define FLOW_JUDGED_FROM 50u /* control steps */
 #define CREEP_STEPS 10u /* control steps between looks at the creep, which takes a hundred times as long */
 
 void controller_default_parameters(struct controller_parameters *parameters, const struct bend_table *table) {
@@ -18,8 +20,20 @@ void controller_default_parameters(struct controller_parameters *parameters, con
     pressure_loop_default_parameters(&parameters->pressure_loop);
     tip_loop_default_parameters(&parameters->tip_loop);
     limits_default_parameters(&parameters->limits, table);
+    sensor_watch_default_parameters(&parameters->sensor_watch, parameters->pressure_loop.sensor_noise_pa);
+    flow_watch_default_parameters(&parameters->flow_watch);
+    board_watch_default_parameters(&parameters->board_watch, parameters->pressure_loop.nominal_supply_pa,
+                                   parameters->limits.working_pressure_pa);
+    tip_watch_default_parameters(&parameters->tip_watch);
     gap_monitor_default_parameters(&parameters->gap_monitor);
     calibration_none(&parameters->calibration);
+}
+
+void controller_seal_parameters(struct controller *controller) {
+    controller->parameters_image = (struct limits_image){.corrupt = false};
+    controller->loops_image = (struct limits_image){.corrupt = false};
+    controller->parameters_crc = crc32_update(0u, &controller->parameters, sizeof controller->parameters);
+    controller->loops_crc = crc32_update(0u, controller->loop_parameters, sizeof controller->loop_parameters);
 }
 
 void controller_set_parameters(struct controller *controller, const struct controller_parameters *parameters) {
@@ -31,6 +45,7 @@ void controller_set_parameters(struct controller *controller, const struct contr
     for (uint32_t c = 0; c < 3u; c++) {
         calibration_apply(calibration, c, &parameters->pressure_loop, &controller->loop_parameters[c]);
     }
+    controller_seal_parameters(controller);
 }
 
 void controller_init(struct controller *controller, const struct bend_table *table,
@@ -38,12 +53,16 @@ void controller_init(struct controller *controller, const struct bend_table *tab
     *controller = (struct controller){.table = table};
     supervisor_init(&controller->supervisor);
     limits_init(&controller->limits);
+    board_watch_init(&controller->board_watch);
+    tip_watch_init(&controller->tip_watch);
     tip_loop_init(&controller->tip_loop);
     gap_monitor_init(&controller->gap_monitor);
     controller_set_parameters(controller, parameters);
     for (uint32_t c = 0; c < 3u; c++) {
         pressure_loop_init(&controller->pressure_loop[c]);
         controller->capacity_m3[c] = controller->loop_parameters[c].nominal_capacity_m3;
+        sensor_watch_init(&controller->sensor_watch[c]);
+        flow_watch_init(&controller->flow_watch[c]);
     }
     controller->tip_lost = true;
     controller->status.state = SUPERVISOR_BOOT;
@@ -173,10 +192,28 @@ static void watch_gap(struct controller *controller, const struct controller_inp
 
 /* --- tip --- */
 
+static float highest_pressure(const struct controller *controller) {
+    const struct pressure_loop *loop = controller->pressure_loop;
+    return real_max(real_max(loop[0].estimate_pa, loop[1].estimate_pa), loop[2].estimate_pa);
+}
+
+static void watch_bend(struct controller *controller, const struct controller_input *input) {
+    const struct tip_watch_view view = {.time_us = input->time_us,
+                                        .measured_rad = controller->tip_loop.measured_rad,
+                                        .gap_rad = controller->tip_loop.gap_rad,
+                                        .slope_radppa = controller->gap_monitor.slope_radppa,
+                                        .highest_pa = highest_pressure(controller),
+                                        .working_pa = controller->parameters.limits.working_pressure_pa};
+    tip_watch_follow(&controller->tip_watch, &controller->parameters.tip_watch, &view, controller->tip_loop.correction_rad);
+}
+
 static void follow_tip(struct controller *controller, const struct controller_input *input) {
     const struct controller_parameters *parameters = &controller->parameters;
     if (input->tip_new) {
-        const bool good = input->tip_status == 0u &&
+        const struct tip_watch_sample sample = {input->time_us, input->tip_position_m, input->tip_quaternion,
+                                                input->tip_status};
+        const bool good = tip_watch_take(&controller->tip_watch, &parameters->tip_watch,
+                                         controller->table != NULL ? &controller->table->module : NULL, &sample) &&
                           tip_loop_update(&controller->tip_loop, &parameters->tip_loop, controller->table,
                                           input->tip_quaternion, input->time_us - input->tip_measured_us,
                                           CONTROLLER_STEP_US);
@@ -188,6 +225,7 @@ static void follow_tip(struct controller *controller, const struct controller_in
             controller->targets_stale = true;
         }
         if (good && controller->tip_loop.compared) {
+            watch_bend(controller, input);
             keep_pose(controller, input);
         }
     }
@@ -228,15 +266,15 @@ static bool command_is_sound(const struct controller *controller, const struct c
     return true;
 }
 
-static enum supervisor_request request_of(enum controller_command_kind kind) {
-    switch (kind) {
+static enum supervisor_request request_of(const struct controller_command *command) {
+    switch (command->kind) {
     case COMMAND_VENT:
         return SUPERVISOR_REQUEST_VENT;
     case COMMAND_HOLD:
         return SUPERVISOR_REQUEST_HOLD;
     case COMMAND_PRESSURE:
     case COMMAND_BEND:
-        return SUPERVISOR_REQUEST_MOVE;
+        return command->said_again ? SUPERVISOR_REQUEST_MOVE_ON : SUPERVISOR_REQUEST_MOVE;
     case COMMAND_CLEAR:
         return SUPERVISOR_REQUEST_CLEAR;
     case COMMAND_NONE:
@@ -245,24 +283,77 @@ static enum supervisor_request request_of(enum controller_command_kind kind) {
     }
 }
 
-/* Faults from this step's readings, the table's check and the age of the last command. Whether a sensor is broken shows in
- * what it `shows` itself, whether a chamber bursts in the pressure behind that. */
+static uint32_t find_corruption(struct controller *controller, const struct controller_input *input) {
+    const uint32_t count = controller->parameters.limits.parameter_bytes_per_step;
+    uint32_t faults = 0u;
+    if (controller->table != NULL &&
+        limits_check_table(&controller->limits, &controller->parameters.limits, controller->table)) {
+        faults |= 1u << FAULT_TABLE_CORRUPT;
+    }
+    const bool odd = controller->step % 2u != 0u;
+    const bool corrupt =
+        odd ? limits_check_image(&controller->loops_image, (const uint8_t *)controller->loop_parameters,
+                                 (uint32_t)sizeof controller->loop_parameters, controller->loops_crc, count)
+            : limits_check_image(&controller->parameters_image, (const uint8_t *)&controller->parameters,
+                                 (uint32_t)sizeof controller->parameters, controller->parameters_crc, count);
+    if (corrupt || controller->loops_image.corrupt || controller->parameters_image.corrupt || input->parameters_corrupt) {
+        faults |= 1u << FAULT_PARAMETERS_CORRUPT;
+    }
+    return faults;
+}
+
+/* One chamber's sensor, in what it `shows` itself, and its valve. An observer that starts has the pressure to find first. */
+static uint32_t find_chamber_faults(struct controller *controller, const struct controller_input *shows, uint32_t c) {
+    const struct pressure_loop *loop = &controller->pressure_loop[c];
+    const bool usable = shows->pressure_ok[c] && real_is_finite(shows->pressure_pa[c]);
+    const struct flow_watch_view view = {loop->estimate_pa, loop->unmodelled_pa, loop->filled_share, loop->fill_pa,
+                                         loop->vent_pa};
+    uint32_t faults = sensor_watch_step(&controller->sensor_watch[c], &controller->parameters.sensor_watch,
+                                        shows->pressure_pa[c], usable, real_max(loop->fill_pa, loop->vent_pa),
+                                        controller->step);
+    if (controller->step >= FLOW_JUDGED_FROM) {
+        faults |= flow_watch_step(&controller->flow_watch[c], &controller->parameters.flow_watch, &view);
+    }
+    return faults;
+}
+
+static uint32_t find_board_faults(struct controller *controller, const struct controller_input *input,
+                                  float highest_pa) {
+    const struct board_watch_view view = {.time_us = input->time_us,
+                                          .supply_pa = input->supply_pa,
+                                          .supply_ok = input->supply_ok,
+                                          .supply_enabled = supervisor_supply_enabled(&controller->supervisor),
+                                          .moving = supervisor_valves_enabled(&controller->supervisor),
+                                          .highest_pa = highest_pa,
+                                          .health = &input->health,
+                                          .outputs_refused = input->outputs_refused,
+                                          .bus_off = input->bus_off};
+    uint32_t faults = board_watch_step(&controller->board_watch, &controller->parameters.board_watch, &view);
+    if (view.moving && input->command.kind == COMMAND_NONE &&
+        input->time_us - controller->command_us >= controller->parameters.command_timeout_us) {
+        faults |= 1u << FAULT_COMMAND_TIMEOUT;
+    }
+    return faults;
+}
+
+/* Whether a sensor is broken shows in what it `shows` itself, whether a chamber bursts in the pressure behind that. */
 static uint32_t find_faults(struct controller *controller, const struct controller_input *input,
                             const struct controller_input *shows) {
     const struct limits_parameters *limits = &controller->parameters.limits;
     uint32_t faults = limits_check_pressures(limits, shows->pressure_pa, shows->pressure_ok);
     faults &= ~(1u << FAULT_OVERPRESSURE);
     faults |= limits_check_pressures(limits, input->pressure_pa, input->pressure_ok);
-    if (controller->table != NULL &&
-        limits_check_table(&controller->limits, &controller->parameters.limits, controller->table)) {
-        faults |= 1u << FAULT_TABLE_CORRUPT;
+    const float highest_pa = highest_pressure(controller);
+    for (uint32_t c = 0; c < 3u; c++) {
+        faults |= find_chamber_faults(controller, shows, c);
     }
-    const bool moves = supervisor_valves_enabled(&controller->supervisor);
-    if (moves && input->command.kind == COMMAND_NONE &&
-        input->time_us - controller->command_us >= controller->parameters.command_timeout_us) {
-        faults |= 1u << FAULT_COMMAND_TIMEOUT;
+    if (limits_check_working(&controller->limits, limits, highest_pa)) {
+        faults |= 1u << FAULT_OVERPRESSURE;
     }
-    return faults;
+    if (tip_watch_disagrees(&controller->tip_watch, &controller->parameters.tip_watch, input->time_us)) {
+        faults |= 1u << FAULT_SENSORS_DISAGREE;
+    }
+    return faults | find_corruption(controller, input) | find_board_faults(controller, input, highest_pa);
 }
 
 static void supervise(struct controller *controller, const struct controller_input *input,
@@ -274,7 +365,7 @@ static void supervise(struct controller *controller, const struct controller_inp
         healthy = healthy && input->pressure_pa[c] < SELFTEST_PRESSURE_PA;
     }
     const bool sound = command_is_sound(controller, command);
-    const enum supervisor_request request = sound ? request_of(command->kind) : SUPERVISOR_REQUEST_NONE;
+    const enum supervisor_request request = sound ? request_of(command) : SUPERVISOR_REQUEST_NONE;
     const bool accepted =
         supervisor_step(&controller->supervisor, input->time_us, present, healthy, request) && sound;
     controller->status.commands_refused += accepted ? 0u : 1u;
@@ -362,6 +453,31 @@ static void drive(struct controller *controller, const struct controller_input *
     }
 }
 
+static uint32_t bit_if(bool present, enum supervisor_warning warning) {
+    return present ? 1u << (uint32_t)warning : 0u;
+}
+
+static uint32_t find_warnings(const struct controller *controller, const struct controller_input *input) {
+    const struct controller_status *status = &controller->status;
+    bool leaks = false, keeps = false;
+    for (uint32_t c = 0; c < 3u; c++) {
+        const bool raised = controller->gap_monitor.valve[c].raised;
+        const struct flow_watch_parameters *flow = &controller->parameters.flow_watch;
+        leaks = leaks || flow_watch_loses(&controller->flow_watch[c], flow) ||
+                (raised && status->gap.pressure_gap_pa[c] < 0.0f);
+        keeps = keeps || flow_watch_keeps(&controller->flow_watch[c], flow) ||
+                (raised && status->gap.pressure_gap_pa[c] > 0.0f);
+    }
+    return tip_watch_warnings(&controller->tip_watch, &controller->parameters.tip_watch, input->time_us) |
+           bit_if(controller->tip_lost, WARNING_TIP_LOST) | bit_if(controller->table == NULL, WARNING_NO_TABLE) |
+           bit_if(status->inverse.flags != 0u, WARNING_COMMAND_LIMITED) |
+           bit_if(status->gap.stage != GAP_MONITOR_NONE, WARNING_MODEL_GAP) | bit_if(leaks, WARNING_LEAK) |
+           bit_if(keeps, WARNING_VENT_WEAK) | bit_if(input->error_passive || input->bus_off, WARNING_CAN_ERROR_PASSIVE) |
+           bit_if(input->health.clock_failed, WARNING_CLOCK_INTERNAL) |
+           bit_if(board_watch_was_late(&controller->board_watch, input->time_us), WARNING_STEP_LATE) |
+           bit_if(!input->supply_ok, WARNING_SUPPLY_UNKNOWN);
+}
+
 void controller_step(struct controller *controller, const struct controller_input *input,
                      struct controller_output *output) {
     struct controller_input corrected = *input;
@@ -378,8 +494,5 @@ void controller_step(struct controller *controller, const struct controller_inpu
     struct controller_status *status = &controller->status;
     status->state = controller->supervisor.state;
     status->faults = controller->supervisor.faults;
-    status->warnings = (controller->tip_lost ? 1u << WARNING_TIP_LOST : 0u) |
-                       (controller->table == NULL ? 1u << WARNING_NO_TABLE : 0u) |
-                       (status->inverse.flags != 0u ? 1u << WARNING_COMMAND_LIMITED : 0u) |
-                       (status->gap.stage != GAP_MONITOR_NONE ? 1u << WARNING_MODEL_GAP : 0u);
+    status->warnings = find_warnings(controller, input);
 }

@@ -10,9 +10,14 @@
 #include "control/calibration.h"
 #include "control/pressure_loop.h"
 #include "control/tip_loop.h"
+#include "hal.h"
+#include "safety/board_watch.h"
+#include "safety/flow_watch.h"
 #include "safety/gap_monitor.h"
 #include "safety/limits.h"
+#include "safety/sensor_watch.h"
 #include "safety/supervisor.h"
+#include "safety/tip_watch.h"
 
 #define CONTROLLER_STEP_US 1000
 
@@ -32,6 +37,7 @@ struct controller_command {
     float bend_rad;           /* COMMAND_BEND, >= 0 */
     float direction_rad;      /* COMMAND_BEND: where the tip moves, from +x counter-clockwise */
     float co_contraction_pa;  /* COMMAND_BEND: least pressure of every chamber */
+    bool said_again;          /* COMMAND_PRESSURE, COMMAND_BEND: known to be a repetition; never starts a motion */
 };
 
 struct controller_parameters {
@@ -43,6 +49,10 @@ struct controller_parameters {
     struct pressure_loop_parameters pressure_loop;
     struct tip_loop_parameters tip_loop;
     struct limits_parameters limits;
+    struct sensor_watch_parameters sensor_watch;
+    struct flow_watch_parameters flow_watch;
+    struct board_watch_parameters board_watch;
+    struct tip_watch_parameters tip_watch;
     struct gap_monitor_parameters gap_monitor;
     struct controller_calibration calibration; /* of this module and board; the identity by default */
 };
@@ -59,8 +69,11 @@ struct controller_input {
     float tip_quaternion[4]; /* w, x, y, z */
     uint16_t tip_quality;
     uint16_t tip_status;
-    bool bus_off; /* of the bus that commands come over */
+    struct hal_health health;
+    bool outputs_refused; /* the outputs of the step before could not be set */
+    bool bus_off;         /* of the bus that commands come over */
     bool error_passive;
+    bool parameters_corrupt; /* the stored ones failed their check */
     struct controller_command command;
 };
 
@@ -96,6 +109,14 @@ struct controller {
     /* state, see controller.c */
     struct supervisor supervisor;
     struct limits limits;
+    struct limits_image parameters_image; /* round through `parameters`, */
+    struct limits_image loops_image;      /* and through `loop_parameters` */
+    uint32_t parameters_crc;
+    uint32_t loops_crc;
+    struct sensor_watch sensor_watch[3];
+    struct flow_watch flow_watch[3];
+    struct board_watch board_watch;
+    struct tip_watch tip_watch;
     struct pressure_loop pressure_loop[3];
     struct pressure_loop_parameters loop_parameters[3]; /* each chamber's, calibrated */
     struct calibration_frames frames;                   /* of the tip sensor */
@@ -121,6 +142,9 @@ void controller_init(struct controller *controller, const struct bend_table *tab
                      const struct controller_parameters *parameters);
 /* Other parameters from now on; only while vented, but for those of parameters.def that say otherwise. */
 void controller_set_parameters(struct controller *controller, const struct controller_parameters *parameters);
+/* After `parameters` or `loop_parameters` were changed on purpose while running: what stands there now is what the running
+ * check compares with. */
+void controller_seal_parameters(struct controller *controller);
 /* One control step; called every CONTROLLER_STEP_US. Always fills `output`. */
 void controller_step(struct controller *controller, const struct controller_input *input,
                      struct controller_output *output);

@@ -120,6 +120,9 @@ void pressure_loop_predict(struct pressure_loop *loop, const struct pressure_loo
     loop->estimate_pa += step_s * (share * fill - (1.0f - share) * vent);
     const float bias_pa = step_s * loop->bias / real_max(capacity_m3, CAPACITY_LEAST_M3);
     const float modelled_pa = real_max(loop->estimate_pa - bias_pa, 0.0f);
+    loop->filled_share = share;
+    loop->fill_pa = step_s * fill - bias_pa;
+    loop->vent_pa = step_s * vent + bias_pa;
     loop->estimate_pa = real_max(loop->estimate_pa, 0.0f);
     loop->unmodelled_pa = loop->estimate_pa - modelled_pa;
     loop->shown_pa += step_s / (parameters->reading_lag_s + step_s) * (loop->estimate_pa - loop->shown_pa);

@@ -49,6 +49,9 @@ struct pressure_loop {
     float innovation_pa;  /* averaged over some 16 samples */
     float unmodelled_pa;  /* change of the estimate in this step that valve and gas do not explain: bias and readings */
     float shown_pa;       /* what a sensor that lags shows of the estimate */
+    float filled_share;   /* of this step in which the valve filled, by the model; */
+    float fill_pa;        /* what filling all the step would have brought, */
+    float vent_pa;        /* and venting all of it taken */
     float duty;           /* of the period under way, as the valve takes it */
     float duty_next;      /* written, taken over at the next period */
     int64_t open_at_us;   /* the valve fills from here ... */

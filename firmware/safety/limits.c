@@ -14,14 +14,17 @@ void limits_default_parameters(struct limits_parameters *parameters, const struc
         .working_pressure_pa = working_pa,
         /* half-way to bursting: with 0.15 kPa of noise, 2 kPa over the working pressure is no noise */
         .hard_pressure_pa = 0.5f * (working_pa + burst_pa),
+        .over_working_pa = 1.05f * working_pa, /* a step to the working limit overshoots by 3.4 % at most */
+        .over_working_steps = 20u,
         .sensor_least_pa = -2500.0f,
-        .sensor_most_pa = 49900.0f, /* of a range that ends at 50 kPa: a broken wire reads full scale */
-        .table_bytes_per_step = 256u,
+        .sensor_most_pa = 49900.0f,  /* of a range that ends at 50 kPa: a broken wire reads full scale */
+        .table_bytes_per_step = 64u, /* eight instructions a byte */
+        .parameter_bytes_per_step = 16u,
     };
 }
 
 void limits_init(struct limits *limits) {
-    *limits = (struct limits){.table_next = COVERED_FROM, .table_crc = 0u, .table_corrupt = false};
+    *limits = (struct limits){.over_steps = 0u};
 }
 
 uint32_t limits_check_pressures(const struct limits_parameters *parameters, const float pressure_pa[3],
@@ -38,16 +41,27 @@ uint32_t limits_check_pressures(const struct limits_parameters *parameters, cons
     return faults;
 }
 
+bool limits_check_working(struct limits *limits, const struct limits_parameters *parameters,
+                          float highest_pa) {
+    limits->over_steps = highest_pa > parameters->over_working_pa ? limits->over_steps + 1u : 0u;
+    return limits->over_steps >= parameters->over_working_steps;
+}
+
+bool limits_check_image(struct limits_image *image, const uint8_t *bytes, uint32_t size, uint32_t expected,
+                        uint32_t count) {
+    const uint32_t left = size - image->next, part = left < count ? left : count;
+    image->crc = crc32_update(image->crc, bytes + image->next, part);
+    image->next += part;
+    if (image->next >= size) {
+        image->corrupt = image->corrupt || image->crc != expected;
+        image->next = 0u;
+        image->crc = 0u;
+    }
+    return image->corrupt;
+}
+
 bool limits_check_table(struct limits *limits, const struct limits_parameters *parameters,
                         const struct bend_table *table) {
-    const uint32_t left = table->image_bytes - limits->table_next;
-    const uint32_t count = left < parameters->table_bytes_per_step ? left : parameters->table_bytes_per_step;
-    limits->table_crc = crc32_update(limits->table_crc, table->image + limits->table_next, count);
-    limits->table_next += count;
-    if (limits->table_next >= table->image_bytes) {
-        limits->table_corrupt = limits->table_corrupt || limits->table_crc != table->image_crc;
-        limits->table_next = COVERED_FROM;
-        limits->table_crc = 0u;
-    }
-    return limits->table_corrupt;
+    return limits_check_image(&limits->table, table->image + COVERED_FROM, table->image_bytes - COVERED_FROM,
+                              table->image_crc, parameters->table_bytes_per_step);
 }

@@ -2,20 +2,19 @@
 
 #include <stddef.h>
 
+#define REACTION "all valves vent, supply shut, latched"
+
 static const struct supervisor_fault_row fault_table[FAULT_COUNT] = {
-    [FAULT_OVERPRESSURE] = {"overpressure", "one sample of a chamber over the hard limit of limits.h",
-                            "all valves vent, supply shut, latched", "clear once every chamber is below the limit"},
-    [FAULT_SENSOR_RANGE] = {"pressure sensor out of range",
-                            "a channel that cannot be read, is not finite or lies outside the sensor's range",
-                            "all valves vent, supply shut, latched", "clear once every channel reads within range"},
-    [FAULT_COMMAND_TIMEOUT] = {"command timeout", "no command for the timeout while ACTIVE or HOLD",
-                               "all valves vent, supply shut, latched", "clear, then command again"},
-    [FAULT_TABLE_CORRUPT] = {"bend table corrupt", "CRC-32 over the table, a part in each step, all of it every second",
-                             "all valves vent, supply shut, latched", "load a sound table and restart"},
+#define FAULT(NAME, title, sees, detector, limit, time, clear, remedy, why)                                  \
+    [FAULT_##NAME] = {title, detector, REACTION, clear, remedy},
+#include "safety/faults.def"
 };
 
 void supervisor_init(struct supervisor *supervisor) {
-    *supervisor = (struct supervisor){.state = SUPERVISOR_BOOT, .faults = 0u, .entered_us = 0};
+    *supervisor = (struct supervisor){.state = SUPERVISOR_BOOT,
+                                      .cause_us = -SUPERVISOR_ABSENT_US,
+                                      .motion_us = -SUPERVISOR_PAUSE_US,
+                                      .clear_us = -SUPERVISOR_PAUSE_US};
 }
 
 static void enter(struct supervisor *supervisor, enum supervisor_state state, int64_t time_us) {
@@ -25,34 +24,75 @@ static void enter(struct supervisor *supervisor, enum supervisor_state state, in
     }
 }
 
-static bool obey(struct supervisor *supervisor, int64_t time_us, uint32_t present, enum supervisor_request request) {
+/* One of these at most starts the module after a self-test: a stream that was flying before must pause first.
+ */
+static bool move(struct supervisor *supervisor, int64_t time_us, bool said_again) {
     const enum supervisor_state state = supervisor->state;
-    const bool runs = state == SUPERVISOR_SAFE || state == SUPERVISOR_ACTIVE || state == SUPERVISOR_HOLD;
+    const bool fresh = !said_again && time_us - supervisor->motion_us >= SUPERVISOR_PAUSE_US;
+    const bool runs = state == SUPERVISOR_ACTIVE || state == SUPERVISOR_HOLD;
+    supervisor->motion_us = time_us;
+    if (said_again) {
+        return state == SUPERVISOR_ACTIVE;
+    }
+    if (!runs && !(state == SUPERVISOR_SAFE && (supervisor->armed || fresh))) {
+        return false;
+    }
+    supervisor->armed = true;
+    enter(supervisor, SUPERVISOR_ACTIVE, time_us);
+    return true;
+}
+
+static bool hold(struct supervisor *supervisor, int64_t time_us) {
+    if (supervisor->state == SUPERVISOR_ACTIVE) {
+        enter(supervisor, SUPERVISOR_HOLD, time_us);
+    }
+    return supervisor->state == SUPERVISOR_HOLD;
+}
+
+static bool clear(struct supervisor *supervisor, int64_t time_us) {
+    const bool alone = time_us - supervisor->clear_us >= SUPERVISOR_PAUSE_US;
+    const bool gone = time_us - supervisor->cause_us >= SUPERVISOR_ABSENT_US;
+    supervisor->clear_us = time_us;
+    if (supervisor->state != SUPERVISOR_FAULT) {
+        return true; /* nothing to clear */
+    }
+    if (!alone || !gone) {
+        return false;
+    }
+    supervisor->faults = 0u;
+    enter(supervisor, SUPERVISOR_SELFTEST, time_us);
+    return true;
+}
+
+static bool obey(struct supervisor *supervisor, int64_t time_us, enum supervisor_request request) {
     switch (request) {
     case SUPERVISOR_REQUEST_MOVE:
-        if (runs) {
-            enter(supervisor, SUPERVISOR_ACTIVE, time_us);
-        }
-        return runs;
+        return move(supervisor, time_us, false);
+    case SUPERVISOR_REQUEST_MOVE_ON:
+        return move(supervisor, time_us, true);
     case SUPERVISOR_REQUEST_HOLD:
-        if (state == SUPERVISOR_ACTIVE) {
-            enter(supervisor, SUPERVISOR_HOLD, time_us);
-        }
-        return state == SUPERVISOR_ACTIVE || state == SUPERVISOR_HOLD;
+        return hold(supervisor, time_us);
     case SUPERVISOR_REQUEST_VENT:
-        if (runs) {
+        if (supervisor_valves_enabled(supervisor)) {
             enter(supervisor, SUPERVISOR_SAFE, time_us);
         }
         return true; /* elsewhere the module is vented already */
     case SUPERVISOR_REQUEST_CLEAR:
-        if (state == SUPERVISOR_FAULT && present == 0u) {
-            supervisor->faults = 0u;
-            enter(supervisor, SUPERVISOR_SAFE, time_us);
-        }
-        return state != SUPERVISOR_FAULT || present == 0u;
+        return clear(supervisor, time_us);
     case SUPERVISOR_REQUEST_NONE:
+    case SUPERVISOR_REQUEST_COUNT:
     default:
         return true;
+    }
+}
+
+static void advance(struct supervisor *supervisor, int64_t time_us, bool healthy) {
+    if (supervisor->state == SUPERVISOR_BOOT) {
+        enter(supervisor, SUPERVISOR_SELFTEST, time_us);
+    } else if (supervisor->state == SUPERVISOR_SELFTEST && healthy &&
+               time_us - supervisor->entered_us >= SUPERVISOR_SELFTEST_US) {
+        supervisor->armed = false;
+        enter(supervisor, SUPERVISOR_SAFE, time_us);
     }
 }
 
@@ -60,14 +100,13 @@ bool supervisor_step(struct supervisor *supervisor, int64_t time_us, uint32_t pr
                      enum supervisor_request request) {
     if (present != 0u) {
         supervisor->faults |= present;
+        supervisor->cause_us = time_us;
+        supervisor->armed = false;
         enter(supervisor, SUPERVISOR_FAULT, time_us);
-    } else if (supervisor->state == SUPERVISOR_BOOT) {
-        enter(supervisor, SUPERVISOR_SELFTEST, time_us);
-    } else if (supervisor->state == SUPERVISOR_SELFTEST && healthy &&
-               time_us - supervisor->entered_us >= SUPERVISOR_SELFTEST_US) {
-        enter(supervisor, SUPERVISOR_SAFE, time_us);
+    } else {
+        advance(supervisor, time_us, healthy);
     }
-    return obey(supervisor, time_us, present, request);
+    return obey(supervisor, time_us, request);
 }
 
 bool supervisor_valves_enabled(const struct supervisor *supervisor) {
@@ -79,7 +118,8 @@ bool supervisor_supply_enabled(const struct supervisor *supervisor) {
 }
 
 const char *supervisor_state_name(enum supervisor_state state) {
-    static const char *const names[SUPERVISOR_STATE_COUNT] = {"BOOT", "SELFTEST", "SAFE", "ACTIVE", "HOLD", "FAULT"};
+    static const char *const names[SUPERVISOR_STATE_COUNT] = {"BOOT",   "SELFTEST", "SAFE",
+                                                              "ACTIVE", "HOLD",     "FAULT"};
     return (uint32_t)state < (uint32_t)SUPERVISOR_STATE_COUNT ? names[state] : "unknown";
 }
 
@@ -89,9 +129,8 @@ const struct supervisor_fault_row *supervisor_fault_describe(enum supervisor_fau
 
 const char *supervisor_warning_text(enum supervisor_warning warning) {
     static const char *const texts[WARNING_COUNT] = {
-        [WARNING_TIP_LOST] = "tip sensor lost: the bend runs open loop",
-        [WARNING_NO_TABLE] = "no valid bend table: pressure commands only",
-        [WARNING_COMMAND_LIMITED] = "the command was out of reach: the nearest reachable one is followed",
-        [WARNING_MODEL_GAP] = "the module does not do what its model says: the gap monitor names the stage"};
+#define WARNING(NAME, title, sees, detector, limit, time, reaction, remedy, why) [WARNING_##NAME] = title,
+#include "safety/faults.def"
+    };
     return (uint32_t)warning < (uint32_t)WARNING_COUNT ? texts[warning] : "unknown";
 }

@@ -1,7 +1,10 @@
-/* The supervisor: which state the controller is in, which faults are latched, and therefore whether air may flow.
+/* The supervisor: which state the controller is in, which faults are latched, and therefore whether air may
+ * flow.
  *
- * Pure: conditions and time in, state out. Not here: how a fault is detected (limits.h), what the valves do about it
- * (controller.h). */
+ * Pure: conditions and time in, state out. A fault is left on purpose only: by a clear, once its cause has
+ * been gone for a while, that does not belong to a stream of clears; it leads through the self-test, and a
+ * stream of motion commands that went on through all of that is refused until it has paused. Not here: how a
+ * fault is detected (watch.h), what the valves do about it (controller.h). */
 #ifndef TRIBEND_SUPERVISOR_H
 #define TRIBEND_SUPERVISOR_H
 
@@ -10,29 +13,25 @@
 
 enum supervisor_state {
     SUPERVISOR_BOOT = 0,
-    SUPERVISOR_SELFTEST,
-    SUPERVISOR_SAFE,   /* vented, waiting for a command */
-    SUPERVISOR_ACTIVE, /* following a pressure or bend command */
-    SUPERVISOR_HOLD,   /* keeping the present pressures */
-    SUPERVISOR_FAULT,  /* vented, latched until cleared on purpose */
+    SUPERVISOR_SELFTEST, /* the supply comes on, no chamber may rise */
+    SUPERVISOR_SAFE,     /* vented, waiting for a command */
+    SUPERVISOR_ACTIVE,   /* following a pressure or bend command */
+    SUPERVISOR_HOLD,     /* keeping the present pressures */
+    SUPERVISOR_FAULT,    /* vented, latched until cleared on purpose */
     SUPERVISOR_STATE_COUNT
 };
 
-/* Faults that latch: bit numbers. One row each in the fault table of supervisor.c. */
+/* Faults that latch: bit numbers, rows of faults.def. */
 enum supervisor_fault {
-    FAULT_OVERPRESSURE = 0,
-    FAULT_SENSOR_RANGE,
-    FAULT_COMMAND_TIMEOUT,
-    FAULT_TABLE_CORRUPT,
+#define FAULT(NAME, title, sees, detector, limit, time, clear, remedy, why) FAULT_##NAME,
+#include "safety/faults.def"
     FAULT_COUNT
 };
 
-/* Conditions that are reported and degrade, without venting: bit numbers. */
+/* Conditions that are reported and degrade, without venting: bit numbers, rows of faults.def. */
 enum supervisor_warning {
-    WARNING_TIP_LOST = 0, /* bend runs open loop */
-    WARNING_NO_TABLE,     /* pressure commands only */
-    WARNING_COMMAND_LIMITED,
-    WARNING_MODEL_GAP, /* the gap monitor raised a stage (gap_monitor.h) */
+#define WARNING(NAME, title, sees, detector, limit, time, reaction, remedy, why) WARNING_##NAME,
+#include "safety/faults.def"
     WARNING_COUNT
 };
 
@@ -42,6 +41,7 @@ struct supervisor_fault_row {
     const char *detector;
     const char *reaction;
     const char *clear;
+    const char *remedy;
 };
 
 /* What the controller wants; refused by the state where it must be. */
@@ -50,20 +50,28 @@ enum supervisor_request {
     SUPERVISOR_REQUEST_VENT,
     SUPERVISOR_REQUEST_HOLD,
     SUPERVISOR_REQUEST_MOVE,
-    SUPERVISOR_REQUEST_CLEAR
+    SUPERVISOR_REQUEST_MOVE_ON, /* a motion command said again: keeps a motion alive, never starts one */
+    SUPERVISOR_REQUEST_CLEAR,
+    SUPERVISOR_REQUEST_COUNT
 };
 
 struct supervisor {
     enum supervisor_state state;
-    uint32_t faults;        /* latched, bit = enum supervisor_fault */
-    int64_t entered_us;     /* when the state was entered */
+    uint32_t faults;    /* latched, bit = enum supervisor_fault */
+    bool armed;         /* a motion command that began after the last self-test was taken */
+    int64_t entered_us; /* when the state was entered */
+    int64_t cause_us;   /* when a cause of a fault was last present */
+    int64_t motion_us;  /* when a motion command last came, taken or not */
+    int64_t clear_us;   /* when a clear last came, taken or not */
 };
 
 #define SUPERVISOR_SELFTEST_US 20000
+#define SUPERVISOR_ABSENT_US 100000 /* a cause must have been gone for so long to be cleared */
+#define SUPERVISOR_PAUSE_US 500000  /* the slowest stream that the command timeout allows comes more often */
 
 void supervisor_init(struct supervisor *supervisor);
-/* One step. `present` are the faults that are detected now (bits); `healthy` says that the self-test sees what it must.
- * Returns false when a request was refused. */
+/* One step. `present` are the faults that are detected now (bits); `healthy` says that the self-test sees
+ * what it must. Returns false when a request was refused. */
 bool supervisor_step(struct supervisor *supervisor, int64_t time_us, uint32_t present, bool healthy,
                      enum supervisor_request request);
 /* May the valves be energised? Only in ACTIVE and HOLD. */

@@ -230,7 +230,7 @@ struct port {
     double leak_conductance;
     double supply_pa_abs; /* ambient while the shut-off valve is shut */
     double slope; /* of the pressure by the gas, 1/m3 */
-    bool supply_open;
+    bool backward; /* the rail takes air as well */
 };
 
 /* Rate of p V through the valve, Pa m3/s. */
@@ -239,7 +239,7 @@ static double valve_rate(const struct port *port, bool fills, double chamber_pa_
     const double other = fills ? port->supply_pa_abs : parameters->ambient_pa_abs;
     const double conductance = fills ? port->conductance : port->vent_conductance;
     double flow = gas_mass_flow(parameters, conductance, other, chamber_pa_abs);
-    if (!fills || port->supply_open) {
+    if (!fills || port->backward) {
         flow -= gas_mass_flow(parameters, conductance, chamber_pa_abs, other);
     }
     return parameters->gas_constant * parameters->temperature_k * flow;
@@ -295,7 +295,7 @@ void chambers_step(struct chambers *chambers, const struct gas_parameters *param
             .leak_conductance = influence->leak_conductance[c],
             .supply_pa_abs = parameters->ambient_pa_abs + (supply_open ? influence->supply_pa : 0.0),
             .slope = chambers->own_slope[c] / chambers->capacity[c][c],
-            .supply_open = supply_open};
+            .backward = supply_open || influence->rail_vents};
         double pressure_pa_abs = parameters->ambient_pa_abs + chambers->pressure_pa[c];
         for (int64_t at_us = from_us; at_us < to_us;) {
             const int64_t switch_us = valve_next_switch_us(&valve[c], at_us);

@@ -48,6 +48,7 @@ struct chamber_influence {
     double coupling[3][3];      /* [i][j]: share of chamber j's pressure that stands in chamber i on top of its own */
     double bridge_kgpspa[3];    /* laminar leak from chamber i to the next (1 -> 2 -> 3 -> 1), kg/(s Pa) */
     double supply_pa;
+    bool rail_vents;            /* with the supply shut, the rail stands open to ambient */
 };
 
 /* Mass flow from upstream to downstream, kg/s (ISO 6358-1:2013); negative pressures differences give zero. */

@@ -16,6 +16,43 @@ void plant_default_parameters(struct plant_parameters *parameters) {
                                             .supply_pa = 40000.0};
 }
 
+#define RELIEF_CONDUCTANCE 4e-10 /* full open: twice a valve's */
+#define RELIEF_OPENS_OVER_PA 500.0
+
+/* A relief valve opens in proportion from its opening pressure on. */
+static double relief(double opening_pa, double pressure_pa) {
+    const double over = opening_pa > 0.0 ? (pressure_pa - opening_pa) / RELIEF_OPENS_OVER_PA : 0.0;
+    return RELIEF_CONDUCTANCE * fmin(fmax(over, 0.0), 1.0);
+}
+
+static void scale_flow(struct chamber_influence *influence, size_t c, double fill, double vent) {
+    if (fill == 1.0 && vent == 1.0) {
+        return; /* not a bit of a sound plant changes */
+    }
+    const double vented = influence->conductance_scale[c] + influence->vent_scale_change[c];
+    influence->conductance_scale[c] *= fill;
+    influence->vent_scale_change[c] = vented * vent - influence->conductance_scale[c];
+}
+
+/* On top of what effects do. */
+static void add_faults(struct plant *plant) {
+    struct chamber_influence *influence = &plant->influence;
+    const struct plant_parameters *parameters = &plant->parameters;
+    const struct plant_faults *faults = &plant->faults;
+    const double pace = 1.0 + faults->clock_slow;
+    influence->rail_vents = parameters->shut_off_vents;
+    influence->supply_pa = faults->supply_replaced ? faults->supply_pa : influence->supply_pa;
+    if (parameters->supply_relief_pa > 0.0) {
+        influence->supply_pa = fmin(influence->supply_pa, parameters->supply_relief_pa);
+    }
+    for (size_t c = 0; c < 3; c++) {
+        scale_flow(influence, c, pace * (1.0 - faults->fill_lost[c]), pace * (1.0 - faults->vent_lost[c]));
+        influence->leak_conductance[c] += faults->leak_conductance[c];
+        influence->leak_conductance[c] += relief(parameters->relief_pa, plant->chambers.pressure_pa[c]);
+        influence->leak_conductance[c] *= pace;
+    }
+}
+
 static void reset_influence(struct plant *plant) {
     plant->influence =
         (struct chamber_influence){.conductance_scale = {1.0, 1.0, 1.0}, .supply_pa = plant->parameters.supply_pa};
@@ -71,8 +108,9 @@ void plant_step(struct plant *plant, bool supply_open, int64_t from_us, int64_t 
     reset_influence(plant);
     signals.influence = &plant->influence;
     effects_run(plant->effect, plant->effect_count, EFFECT_HOOK_GAS, &signals);
-    chambers_step(&plant->chambers, &plant->parameters.gas, plant->table, plant->valve, &plant->influence, supply_open,
-                  from_us, to_us);
+    add_faults(plant);
+    chambers_step(&plant->chambers, &plant->parameters.gas, plant->table, plant->valve, &plant->influence,
+                  supply_open || plant->parameters.no_shut_off, from_us, to_us);
     for (size_t c = 0; c < 3; c++) {
         plant->pressure_pa[c] = plant->chambers.pressure_pa[c];
         for (size_t d = 0; d < 3; d++) {

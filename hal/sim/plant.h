@@ -9,15 +9,30 @@
 
 #define PLANT_EFFECTS_MAX 16
 
+/* What goes wrong with it; zero: nothing. */
+struct plant_faults {
+    bool supply_replaced;          /* the regulator lets this through instead */
+    double supply_pa;
+    double leak_conductance[3];    /* m3/(s Pa) */
+    double fill_lost[3];           /* share of the flow that a valve no longer lets in, */
+    double vent_lost[3];           /* and out */
+    double clock_slow;             /* share by which the board's clock is slow: more flows in what it takes for a step */
+};
+
 struct plant_parameters {
     struct gas_parameters gas;
     struct valve_parameters valve;
     double supply_pa;
+    bool no_shut_off;        /* the supply-enable output drives nothing */
+    bool shut_off_vents;     /* it is a 3/2 valve: shut, it vents the rail behind it */
+    double relief_pa;        /* of a relief valve on each chamber; 0: none */
+    double supply_relief_pa; /* of one on the supply; 0: none */
 };
 
 struct plant {
     const struct bend_table *table;
     struct plant_parameters parameters;
+    struct plant_faults faults;
     struct effect effect[PLANT_EFFECTS_MAX];
     size_t effect_count;
     struct valve valve[3];

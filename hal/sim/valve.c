@@ -46,6 +46,9 @@ void valve_cut(struct valve *valve, const struct valve_parameters *parameters, i
 }
 
 bool valve_fills(const struct valve *valve, int64_t time_us) {
+    if (valve->stuck != VALVE_FREE) {
+        return valve->stuck == VALVE_STUCK_FILLING;
+    }
     for (uint32_t i = 0; i < valve->count; i++) {
         if (time_us >= valve->pulse[i].open_at_us && time_us < valve->pulse[i].close_at_us) {
             return true;
@@ -55,6 +58,9 @@ bool valve_fills(const struct valve *valve, int64_t time_us) {
 }
 
 int64_t valve_next_switch_us(const struct valve *valve, int64_t time_us) {
+    if (valve->stuck != VALVE_FREE) {
+        return INT64_MAX;
+    }
     for (uint32_t i = 0; i < valve->count; i++) {
         if (time_us < valve->pulse[i].open_at_us) {
             return valve->pulse[i].open_at_us;

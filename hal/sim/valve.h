@@ -20,9 +20,13 @@ struct valve_pulse {
     int64_t close_at_us;
 };
 
+/* A spool that no longer follows its coil. */
+enum valve_stuck { VALVE_FREE = 0, VALVE_STUCK_FILLING, VALVE_STUCK_VENTING };
+
 struct valve {
     struct valve_pulse pulse[VALVE_PULSES_MAX]; /* in the order of time */
     uint32_t count;
+    enum valve_stuck stuck;
 };
 
 void valve_init(struct valve *valve);

@@ -212,7 +212,9 @@ static void command(struct follower *follower) {
     }
     const bool changed = follower->next != before;
     follower->changed_us = changed ? now_us : follower->changed_us;
-    if (follower->next > 0 && (changed || now_us >= follower->next_send_us)) {
+    const enum supervisor_state state = follower->report.status.state;
+    const bool listens = state != SUPERVISOR_BOOT && state != SUPERVISOR_SELFTEST; /* a stream from before is refused */
+    if (listens && follower->next > 0 && (changed || now_us >= follower->next_send_us)) {
         follower->next_send_us = now_us + REPEAT_US;
         (void)follower->interface.send(follower->interface.context, present_command(follower));
     }
@@ -278,7 +280,7 @@ static void run_job(struct job *job, struct follower *follower) {
         step(follower);
         const enum supervisor_state state = follower->report.status.state;
         faulted = state == SUPERVISOR_FAULT;
-        ready = ready || (state != SUPERVISOR_BOOT && state != SUPERVISOR_SELFTEST);
+        ready = ready || (state != SUPERVISOR_BOOT && state != SUPERVISOR_SELFTEST && state != SUPERVISOR_FAULT);
     }
     job->sums.faults = follower->report.status.faults;
     job->sums.never_ready = !ready && end_us > READY_WITHIN_US;

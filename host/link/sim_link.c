@@ -37,6 +37,11 @@ static bool tap_write_outputs(void *context, const struct hal_outputs *outputs) 
     return link->plant.write_outputs(link->plant.context, outputs);
 }
 
+static void tap_read_health(void *context, struct hal_health *health) {
+    struct sim_link *link = context;
+    link->plant.read_health(link->plant.context, health);
+}
+
 static bool sim_link_send(void *context, const struct controller_command *command) {
     struct sim_link *link = context;
     app_command(&link->app, command);
@@ -75,7 +80,8 @@ void sim_link_open_setup(struct sim_link *link, const struct sim_link_setup *set
                                 .time_us = tap_time_us,
                                 .read_pressures = tap_read_pressures,
                                 .read_tip = tap_read_tip,
-                                .write_outputs = tap_write_outputs};
+                                .write_outputs = tap_write_outputs,
+                                .read_health = tap_read_health};
     app_init(&link->app, &link->tapped, setup->controller_table, &setup->controller);
     *interface = (struct link){
         .context = link, .send = sim_link_send, .receive = sim_link_receive, .close = sim_link_close};

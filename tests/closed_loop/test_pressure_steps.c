@@ -13,7 +13,7 @@ static double full_flow_ms(double from_pa, double to_pa) {
     struct sim_parameters parameters;
     struct chambers chambers;
     const bool up = to_pa > from_pa;
-    const struct valve open[3] = {{{{0, INT64_MAX}}, 1}, {.count = 0}, {.count = 0}}, shut[3] = {{.count = 0}, {.count = 0}, {.count = 0}};
+    const struct valve open[3] = {{.pulse = {{0, INT64_MAX}}, .count = 1}, {.count = 0}, {.count = 0}}, shut[3] = {{.count = 0}, {.count = 0}, {.count = 0}};
     sim_default_parameters(&parameters);
     const struct chamber_influence influence = {.conductance_scale = {1.0, 1.0, 1.0},
                                                 .supply_pa = parameters.plant.supply_pa};
@@ -42,7 +42,7 @@ static double forced_ripple_pa(double pressure_pa) {
     sim_default_parameters(&parameters);
     const struct gas_parameters *gas = &parameters.plant.gas;
     chambers_init(&chambers, gas, &rig_file.table);
-    const struct valve shut[3] = {{.count = 0}, {.count = 0}, {.count = 0}}, open[3] = {{{{0, INT64_MAX}}, 1}, {.count = 0}, {.count = 0}};
+    const struct valve shut[3] = {{.count = 0}, {.count = 0}, {.count = 0}}, open[3] = {{.pulse = {{0, INT64_MAX}}, .count = 1}, {.count = 0}, {.count = 0}};
     const struct chamber_influence influence = {.conductance_scale = {1.0, 1.0, 1.0},
                                                 .supply_pa = parameters.plant.supply_pa};
     double rate[2] = {0.0, 0.0};

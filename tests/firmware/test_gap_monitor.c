@@ -216,11 +216,18 @@ static void a_reading_where_a_chamber_has_vented_is_the_pressure_sensors(void **
     print_message("           reading while vented: named after at most %.1f s\n", most_s);
 }
 
+/* What is to be seen here is a fault by now, which vents: not with this. */
+static void let_the_valves_be(struct rig *rig) {
+    rig->sim.app.controller.parameters.flow_watch.most_pa = 1e9f;
+    controller_seal_parameters(&rig->sim.app.controller);
+}
+
 static void an_offset_at_work_is_the_bodys_until_the_module_has_vented(void **state) {
     (void)state;
     static struct rig rig;
     const struct controller_command bend = rig_bend(60.0, 180.0), vent = {.kind = COMMAND_VENT};
     start(&rig, 310);
+    let_the_valves_be(&rig);
     rig_command(&rig, &bend);
     run_with(&rig, GAP_MONITOR_NONE, 3000);
     tap.pressure_offset_pa[0] = 700.0f;
@@ -320,6 +327,7 @@ static void air_in_a_chamber_that_should_be_empty_is_the_valves(void **state) {
     static struct rig rig;
     const struct controller_command bend = rig_bend(50.0, 0.0); /* chamber 1 idles */
     start(&rig, 520);
+    let_the_valves_be(&rig);
     tap.leak_duty[0] = 0.3f;
     rig_command(&rig, &bend);
     print_message("           air in an idle chamber: named after %.1f s\n",
@@ -362,6 +370,7 @@ static void a_warning_changes_no_output(void **state) {
     add_effect(&warned, "creep:amplitude=0.1,time_constant=2");
     add_effect(&deaf, "creep:amplitude=0.1,time_constant=2");
     deaf.sim.app.controller.parameters.gap_monitor.persist_s = 1e9f;
+    controller_seal_parameters(&deaf.sim.app.controller);
     rig_command(&warned, &bend);
     rig_command(&deaf, &bend);
     for (int i = 0; i < 8000; i++) {

@@ -85,7 +85,7 @@ static double rigid(enum bend_table_channel channel, const double pressure_pa[3]
 
 static void fill(struct chambers *chambers, const struct gas_parameters *gas, const struct bend_table *table,
                  double supply_pa, int64_t duration_us, int64_t step_us) {
-    const struct valve open[3] = {{{{0, INT64_MAX}}, 1}, {.count = 0}, {.count = 0}};
+    const struct valve open[3] = {{.pulse = {{0, INT64_MAX}}, .count = 1}, {.count = 0}, {.count = 0}};
     const struct chamber_influence influence = {.conductance_scale = {1.0, 1.0, 1.0}, .supply_pa = supply_pa};
     for (int64_t at_us = 0; at_us < duration_us; at_us += step_us) {
         chambers_step(chambers, gas, table, open, &influence, true, at_us, at_us + step_us);
@@ -158,7 +158,7 @@ static void a_shut_supply_gives_no_air(void **state) {
     synthetic_table_create(&synthetic, 9, 10000.0, 1.0, synthetic_module);
     sim_default_parameters(&parameters);
     chambers_init(&chambers, &parameters.plant.gas, &synthetic.table);
-    const struct valve open[3] = {{{{0, INT64_MAX}}, 1}, {{{0, INT64_MAX}}, 1}, {{{0, INT64_MAX}}, 1}};
+    const struct valve open[3] = {{.pulse = {{0, INT64_MAX}}, .count = 1}, {.pulse = {{0, INT64_MAX}}, .count = 1}, {.pulse = {{0, INT64_MAX}}, .count = 1}};
     const struct chamber_influence influence = {.conductance_scale = {1.0, 1.0, 1.0}, .supply_pa = 40000.0};
     for (int64_t at_us = 0; at_us < 1000000; at_us += 1000) {
         chambers_step(&chambers, &parameters.plant.gas, &synthetic.table, open, &influence, false, at_us, at_us + 1000);
@@ -224,7 +224,7 @@ static void a_snapping_chamber_follows_its_curve_and_comes_back(void **state) {
         int64_t at_us = 0;
         chambers_init(&chambers, &parameters.plant.gas, &synthetic.table);
         assert_true(chambers.snaps);
-        valve[c] = (struct valve){{{0, INT64_MAX}}, 1};
+        valve[c] = (struct valve){.pulse = {{0, INT64_MAX}}, .count = 1};
         for (; chambers.volume_m3[c] < 2e-6 + 0.055 * 2.1e-4; at_us += 1000) {
             chambers_step(&chambers, &parameters.plant.gas, &synthetic.table, valve, &influence, true, at_us, at_us + 1000);
             const double volume_m2 = (chambers.volume_m3[c] - parameters.plant.gas.tube_volume_m3) / 0.055;

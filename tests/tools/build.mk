@@ -25,13 +25,16 @@ EMULATED_C := $(wildcard host/board/*.c)
 HOST_MAIN  := host/cli/main.c
 TEST_C     := $(wildcard tests/*/test_*.c)
 BENCH_C    := $(wildcard tests/bench/bench_*.c)
-SUPPORT_C  := $(filter-out $(TEST_C) $(BENCH_C),$(wildcard tests/*/*.c))
+CAMPAIGN_MAIN := tests/campaign/campaign_main.c
+FAULTS_PAGE_C := tests/docs/faults_page.c
+SUPPORT_C  := $(filter-out $(TEST_C) $(BENCH_C) $(FAULTS_PAGE_C) tests/campaign/%,$(wildcard tests/*/*.c))
+CAMPAIGN_C := $(filter-out $(TEST_C) $(CAMPAIGN_MAIN),$(wildcard tests/campaign/*.c))
 SOLID_C    := $(wildcard tests/model/ccx/*.c)
 BLIND_SCORE_C := $(wildcard tests/gap/blind/blind_score*.c)
 SHARE_C := $(wildcard tests/gap/share/*.c)
 BLIND_MAIN := tests/gap/blind/blind_generate.c
 BLIND_C    := $(filter-out $(BLIND_SCORE_C) $(BLIND_MAIN),$(wildcard tests/gap/blind/blind_*.c))
-ALL_C      := $(wildcard docs/examples/*.c) $(FIRMWARE_C) $(SIM_C) $(EMULATOR_C) $(MODEL_C) $(TABLES_CLI_C) $(HOST_C) $(HOST_MAIN) $(EMULATED_C) $(TEST_C) $(BENCH_C) $(SUPPORT_C) $(SOLID_C) $(BLIND_C) $(BLIND_MAIN) $(BLIND_SCORE_C) $(SHARE_C) $(BOARD_C)
+ALL_C      := $(wildcard docs/examples/*.c) $(FIRMWARE_C) $(SIM_C) $(EMULATOR_C) $(MODEL_C) $(TABLES_CLI_C) $(HOST_C) $(HOST_MAIN) $(EMULATED_C) $(TEST_C) $(BENCH_C) $(SUPPORT_C) $(CAMPAIGN_C) $(CAMPAIGN_MAIN) $(FAULTS_PAGE_C) $(SOLID_C) $(BLIND_C) $(BLIND_MAIN) $(BLIND_SCORE_C) $(SHARE_C) $(BOARD_C)
 ALL_H      := $(wildcard tests/gap/blind/*.h tests/model/ccx/*.h firmware/*.h firmware/*/*.h hal/*.h hal/*/*.h model/*/*.h host/*/*.h tests/*/*.h)
 
 # --- flags
@@ -82,6 +85,9 @@ $(BUILD)/model/%.o: model/%.c
 $(BUILD)/host/gap/%.o: host/gap/%.c
 	@mkdir -p $(@D)
 	$(say)$(CC) $(OPTIMISE) $(SANITIZE_FLAGS) $(COMMON_FLAGS) -fopenmp -MMD -MP -c $< -o $@
+$(BUILD)/tests/campaign/%.o: tests/campaign/%.c
+	@mkdir -p $(@D)
+	$(say)$(CC) $(OPTIMISE) $(SANITIZE_FLAGS) $(COMMON_FLAGS) -fopenmp -MMD -MP -c $< -o $@
 $(BUILD)/tests/gap/share/%.o: tests/gap/share/%.c
 	@mkdir -p $(@D)
 	$(say)$(CC) $(OPTIMISE) $(SANITIZE_FLAGS) $(MODEL_FLAGS) -MMD -MP -c $< -o $@
@@ -100,7 +106,7 @@ $(BUILD)/tribend-board: $(EMULATED_O) $(HOST_O) $(EMULATOR_O) $(SIM_O) $(FIRMWAR
 	$(link) $(EMULATOR_LIBS)
 
 .PHONY: test-programs bench-programs
-test-programs: $(TEST_PROGRAMS) $(BLIND_PROGRAMS) $(SELFTEST_ELF)
+test-programs: $(TEST_PROGRAMS) $(BLIND_PROGRAMS) $(BUILD)/tests/campaign/campaign $(BUILD)/tests/docs/faults_page $(SELFTEST_ELF)
 bench-programs: $(BENCH_PROGRAMS)
 
 # Tests of the model link its libraries; the others link what `tribend` links.
@@ -117,6 +123,11 @@ $(BUILD)/tests/gap/blind/blind_score: $(call object,$(BLIND_SCORE_C))
 # Steps over cores and ranks: the tables' own sweep, which needs MPI.
 $(BUILD)/tests/gap/share/gap_share: $(call object,$(SHARE_C) $(wildcard model/sweep/*.c))
 	$(link) $(shell pkg-config --libs mpi-c 2>/dev/null) -lz -fopenmp
+$(BUILD)/tests/docs/faults_page: $(call object,$(FAULTS_PAGE_C)) $(FIRMWARE_O)
+	$(link) -lm
+$(BUILD)/tests/campaign/test_campaign: $(call object,$(CAMPAIGN_C))
+$(BUILD)/tests/campaign/campaign: $(call object,$(CAMPAIGN_MAIN) $(CAMPAIGN_C)) $(HOST_O) $(SIM_O) $(FIRMWARE_O) $(SHARED_O)
+	$(link) $(HOST_LIBS)
 $(BUILD)/tests/gap/test_blind_plant: $(call object,$(filter-out %/blind_truth.c,$(BLIND_C)))
 $(BUILD)/tests/board/test_conversions: $(call object,$(PORT_PURE_C))
 $(BUILD)/tests/%: $(BUILD)/tests/%.o $(SUPPORT_O) $(HOST_O) $(EMULATOR_O) $(SIM_O) $(FIRMWARE_O) $(SHARED_O)

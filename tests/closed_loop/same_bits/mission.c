@@ -64,6 +64,13 @@ int main(int argc, char **argv) {
         return 1;
     }
     controller_default_parameters(&parameters, &table);
+    /* readings that no plant makes: what the detectors compute still counts, what they find does not */
+    parameters.sensor_watch.rate_pa = 1e9f;
+    parameters.sensor_watch.noise_most_pa = 1e9f;
+    parameters.flow_watch.most_pa = 1e9f;
+    parameters.flow_watch.missing_pa = 1e9f;
+    parameters.tip_watch.excess_rad = 10.0f;
+    parameters.tip_watch.jump_rad = 3.0f;
     controller_init(&controller, &table, &parameters);
     for (int step = 0; step < STEPS; step++) {
         struct controller_input input = {.time_us = (int64_t)step * CONTROLLER_STEP_US,
@@ -86,6 +93,9 @@ int main(int argc, char **argv) {
         hash = mix(hash, output.duty, sizeof output.duty);
         hash = mix(hash, controller.status.pressure_estimate_pa, sizeof controller.status.pressure_estimate_pa);
         hash = mix(hash, controller.status.pressure_target_pa, sizeof controller.status.pressure_target_pa);
+        hash = mix(hash, &controller.status.warnings, sizeof controller.status.warnings);
+        hash = mix(hash, controller.sensor_watch, sizeof controller.sensor_watch);
+        hash = mix(hash, controller.flow_watch, sizeof controller.flow_watch);
         hash = mix(hash, &controller.status.bend_rad, sizeof controller.status.bend_rad);
         hash = mix(hash, &controller.status.direction_rad, sizeof controller.status.direction_rad);
     }
