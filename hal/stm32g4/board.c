@@ -42,8 +42,9 @@ static bool read_tip(void *context, struct hal_tip_sample *sample) {
 }
 
 static bool write_outputs(void *context, const struct hal_outputs *outputs) {
-    (void)context;
-    return valves_write(outputs);
+    struct board *board = context;
+    board->outputs_set = valves_write(outputs);
+    return board->outputs_set;
 }
 
 static void read_health(void *context, struct hal_health *health) {
@@ -114,11 +115,14 @@ void board_wait(struct board *board) {
     board->steps_late += stalled ? 0u : passed - 1u;
     board->time_us += (int64_t)passed * (int64_t)TIME_BASE_STEP_US;
     board->tick = tick;
+    board->outputs_set = false;
     can_step(board->time_us);
 }
 
 void board_completed(struct board *board, uint32_t state) {
     faults_mark_step(board->tick, state);
     time_base_completed(board->tick);
-    watchdog_feed(valves_enabled());
+    if (board->outputs_set) {
+        watchdog_feed(valves_enabled());
+    }
 }

@@ -18,6 +18,7 @@ struct board {
     uint32_t steps_late;
     uint32_t steps_stalled; /* missed while the core's own flash bank was erased or written */
     uint32_t pressures_missed;
+    bool outputs_set; /* in the step that runs: what feeds the watchdog */
     bool watchdog_reset;
     bool brown_out_reset;
     bool crashed;
@@ -35,7 +36,8 @@ void board_start(struct board *board, uint32_t *clock_hz);
 void board_run(struct board *board);
 /* Sleep until the next step is due; then `board->time_us` is its time. */
 void board_wait(struct board *board);
-/* The step is complete, in supervisor state `state`. */
+/* The step is complete, in supervisor state `state`. Feeds the watchdog if the step could set its outputs: what cannot be set
+ * ends in a reset, which vents. */
 void board_completed(struct board *board, uint32_t state);
 
 #endif
