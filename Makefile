@@ -43,7 +43,7 @@ gap-check: setup ## blind check of the diagnosis: data of another plant, truth w
 firmware: ## build what is flashed (ELF, hex, bin, map in BUILD/firmware) and hold flash, RAM and stack to their bounds
 	@tests/tools/setup $(FIRMWARE_PACKAGES)
 	@$(MAKE) --no-print-directory -j$(JOBS) firmware-files
-	@tests/tools/firmware_report $(ELF) $(BOARD)
+	@tests/tools/firmware_report $(ELF)
 
 flash: firmware ## put it on a NUCLEO-G474RE with openocd, st-flash or dfu-util (TOOL=one of them)
 	@tests/tools/flash $(ELF:.elf=)

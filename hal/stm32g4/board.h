@@ -5,6 +5,7 @@
 #include <stdbool.h>
 #include <stdint.h>
 
+#include "comms/tip_stream.h"
 #include "hal.h"
 #include "stm32g4/can.h"
 #include "stm32g4/crash_record.h"
@@ -18,6 +19,7 @@ struct board {
     uint32_t steps_late;
     uint32_t steps_stalled; /* missed while the core's own flash bank was erased or written */
     uint32_t pressures_missed;
+    struct tip_stream tip_stream;
     bool outputs_set; /* in the step that runs: what feeds the watchdog */
     bool watchdog_reset;
     bool brown_out_reset;
@@ -36,8 +38,10 @@ void board_start(struct board *board, uint32_t *clock_hz);
 void board_run(struct board *board);
 /* Sleep until the next step is due; then `board->time_us` is its time. */
 void board_wait(struct board *board);
-/* The step is complete, in supervisor state `state`. Feeds the watchdog if the step could set its outputs: what cannot be set
- * ends in a reset, which vents. */
+/* The step is complete, in supervisor state `state`. Feeds the watchdog if the step could set its outputs:
+ * what cannot be set ends in a reset, which vents. */
 void board_completed(struct board *board, uint32_t state);
+/* Shut the valves and start again. */
+_Noreturn void board_reset(void);
 
 #endif

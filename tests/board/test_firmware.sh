@@ -7,7 +7,7 @@ work=$(mktemp -d)
 trap 'rm -rf "$work"' EXIT
 shown=$work/said
 
-report() { tests/tools/firmware_report "$elf" "$build/board" >"$work/said" 2>&1; }
+report() { tests/tools/firmware_report "$elf" >"$work/said" 2>&1; }
 report && grep -q 'flash, firmware and table' "$work/said"
 check flash_ram_and_stack_are_within_their_bounds $?
 FLASH_BOUND=200000 report
