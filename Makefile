@@ -50,7 +50,7 @@ flash: firmware ## put it on a NUCLEO-G474RE with openocd, st-flash or dfu-util 
 
 misra: ## MISRA C:2012 over the firmware and the board's port; docs/misra.md has the deviations
 	@tests/tools/setup cppcheck
-	@tests/tools/misra $(BUILD)
+	@JOBS=$(JOBS) tests/tools/misra $(BUILD)
 
 campaign: setup ## break the simulated board in every way, alone and in pairs (MISSIONS=n SEED=n FAULT=text CSV=file)
 	@$(MAKE) --no-print-directory -j$(JOBS) $(BUILD)/tests/campaign/campaign

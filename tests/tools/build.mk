@@ -189,7 +189,7 @@ lint-board:
 	@set -e; for c in "clang $(BOARD_CLANG) -O2" "arm-none-eabi-gcc $(ARM_CORE) -O2"; do for f in $(BOARD_C); do \
 	    $$c $(FIRMWARE_FLAGS) -c $$f -o /dev/null || { echo "lint: $$c rejects $$f"; exit 1; }; done; done
 lint-misra:
-	@tests/tools/misra $(BUILD)
+	@JOBS=$(JOBS) tests/tools/misra $(BUILD)
 lint-clang:
 	@set -e; for f in $(HOST_SIDE_C); do clang -O1 $(COMMON_FLAGS) $(MPI_FLAGS) -Wno-unknown-pragmas -Wno-source-uses-openmp \
 	    -fopenmp -fsyntax-only $$f; done
