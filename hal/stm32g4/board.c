@@ -65,6 +65,7 @@ static void board_read_health(void *context, struct hal_health *health) {
                                   .watchdog_reset = board->watchdog_reset,
                                   .brown_out_reset = board->brown_out_reset,
                                   .crashed = board->crashed,
+                                  .brown_out_low = board->brown_out_low,
                                   .steps_late = board->steps_late};
 }
 
@@ -110,7 +111,7 @@ void board_start(struct board *board, uint32_t *clock_hz) {
     tip_stream_init(&board->tip_stream, TIP_STREAM_AGE_US);
     tip_uart_start(*clock_hz);
     board->storage_usable = flash_start(&board->storage);
-    board->brown_out_set = supply_monitor_brown_out_is_set();
+    board->brown_out_low = !supply_monitor_brown_out_is_set();
 }
 
 void board_run(struct board *board) {

@@ -27,7 +27,7 @@ struct board {
     struct crash_record crash; /* meaningful with crashed */
     bool bus_started;
     bool storage_usable;
-    bool brown_out_set; /* the option bytes have the brown-out reset where it belongs */
+    bool brown_out_low; /* the option bytes have the brown-out reset under 2.8 V */
     uint16_t reference_calibration;
 };
 

@@ -61,12 +61,6 @@ static uint32_t look_u32(const char *symbol) {
     return value;
 }
 
-static bool look_bool(const char *symbol) {
-    uint8_t value;
-    look(symbol, &value, sizeof value);
-    return value != 0;
-}
-
 static struct crash_record look_record(void) {
     struct crash_record record;
     look("kept_record", &record, sizeof record);
@@ -120,6 +114,26 @@ static void send_pressures(float pressure_pa) {
     assert_true(board_send(&board, &frame));
 }
 
+/* The next HEALTH that the board sends. */
+static struct message_health health(void) {
+    struct message_health message;
+    struct can_host_heard heard;
+    struct message_trouble trouble = {0};
+    while (board_receive(&board, &heard)) {
+    }
+    for (int i = 0; i < 2000; i++) {
+        board_run(&board, 1000);
+        while (board_receive(&board, &heard)) {
+            if (heard.frame.id == message_identifier(MESSAGE_HEALTH, NODE)) {
+                message_unpack(MESSAGE_HEALTH, heard.frame.data, &message, &trouble);
+                return message;
+            }
+        }
+    }
+    fail_msg("no HEALTH in two seconds");
+    return message;
+}
+
 /* Started, and every chamber at some kilopascals, its valve being driven. */
 static void move(void) {
     board_run(&board, START_US);
@@ -162,9 +176,13 @@ static void a_step_begins_every_millisecond(void **state) {
     assert_in_range(watched_steps.count, 999, 1001);
     assert_in_range(watched_steps.shortest_us, 990, 1000);
     assert_in_range(watched_steps.longest_us, 1000, 1010);
-    assert_false(look_bool("crystal_failed"));
     assert_int_equal(board.resets, 0);
     no_oddities();
+    const struct message_health reported = health();
+    assert_false(reported.clock_failed || reported.watchdog_reset || reported.brown_out_reset ||
+                 reported.crashed);
+    assert_true(reported.table_found);
+    assert_int_equal(reported.steps_late, 0);
 }
 
 static void outputs_stay_off_until_a_command_comes(void **state) {
@@ -180,7 +198,7 @@ static void without_a_crystal_the_internal_oscillator_takes_over(void **state) {
     board_crystal(&board, false);
     board_press_reset(&board);
     board_run(&board, START_US);
-    assert_true(look_bool("crystal_failed"));
+    assert_true(health().clock_failed);
     watch_steps();
     board_run(&board, 500000);
     assert_in_range(watched_steps.count, 499, 501);
@@ -193,20 +211,28 @@ static void a_crystal_that_stops_later_costs_less_than_a_step(void **state) {
     board_run(&board, 100000);
     board_crystal(&board, false);
     board_run(&board, 400000);
-    assert_true(look_bool("crystal_failed"));
     assert_in_range(watched_steps.count, 498, 501);
     assert_in_range(watched_steps.longest_us, 1000, 2000);
+    assert_true(health().clock_failed);
     assert_int_equal(board.resets, 0);
 }
 
 static void a_step_that_hangs_shuts_the_valves_then_resets(void **state) {
     (void)state;
+    uint32_t address;
+    uint16_t code;
     move();
+    assert_true(board_symbol(&board, "controller_step", &address));
+    assert_true(core_read(&board.core, address & ~1u, &code, sizeof code));
     assert_true(board_hang(&board, "controller_step"));
     const int64_t shut_us = run_until(shut, 50000);
     assert_in_range(shut_us, 1000, 7000);
     assert_int_equal(look_u32("hung_count"), 1);
     assert_in_range(shut_us + run_until(was_reset, 50000), 10000, 24000);
+    assert_true(core_patch(&board.core, address & ~1u, &code, sizeof code));
+    const struct message_health reported = health();
+    assert_true(reported.watchdog_reset);
+    assert_false(reported.crashed || reported.brown_out_reset);
 }
 
 static void a_bus_fault_shuts_the_valves_and_leaves_a_record(void **state) {
@@ -238,6 +264,7 @@ static void a_bus_fault_shuts_the_valves_and_leaves_a_record(void **state) {
     assert_int_equal(board.resets, 1);
     record = look_record();
     assert_false(crash_record_is_sound(&record));
+    assert_true(health().crashed);
     assert_false(board.wiring.coils_driven);
 }
 
@@ -249,7 +276,17 @@ static void a_dip_of_the_electronics_supply_shuts_everything(void **state) {
     board_supply(&board, 3.3);
     board_run(&board, START_US);
     assert_true(board.resets >= 1);
+    assert_true(health().brown_out_reset);
     assert_false(board.wiring.coils_driven);
+}
+
+static void a_brown_out_reset_that_is_set_too_low_is_said(void **state) {
+    (void)state;
+    board_run(&board, START_US);
+    assert_false(health().brown_out_low);
+    board.flash.options &= ~(7u << 8); /* 1.7 V, as chips are delivered */
+    board_press_reset(&board);
+    assert_true(health().brown_out_low);
 }
 
 static void outputs_that_cannot_be_set_end_in_a_reset(void **state) {
@@ -260,6 +297,7 @@ static void outputs_that_cannot_be_set_end_in_a_reset(void **state) {
     assert_true(board_symbol(&board, "valves_write", &address));
     assert_true(core_patch(&board.core, address & ~1u, return_false, sizeof return_false));
     (void)run_until(was_reset, 25000);
+    assert_false(board.wiring.coils_driven);
 }
 
 static void the_stack_is_as_deep_as_the_build_says_at_most(void **state) {
@@ -295,6 +333,7 @@ int main(void) {
         cmocka_unit_test_setup_teardown(a_step_that_hangs_shuts_the_valves_then_resets, begin, end),
         cmocka_unit_test_setup_teardown(a_bus_fault_shuts_the_valves_and_leaves_a_record, begin, end),
         cmocka_unit_test_setup_teardown(a_dip_of_the_electronics_supply_shuts_everything, begin, end),
+        cmocka_unit_test_setup_teardown(a_brown_out_reset_that_is_set_too_low_is_said, begin, end),
         cmocka_unit_test_setup_teardown(outputs_that_cannot_be_set_end_in_a_reset, begin, end),
         cmocka_unit_test_setup_teardown(the_stack_is_as_deep_as_the_build_says_at_most, begin, end),
     };
