@@ -43,14 +43,14 @@ gap-check: setup ## blind check of the diagnosis: data of another plant, truth w
 firmware: ## build what is flashed (ELF, hex, bin, map in BUILD/firmware) and hold flash, RAM and stack to their bounds
 	@tests/tools/setup $(FIRMWARE_PACKAGES)
 	@$(MAKE) --no-print-directory -j$(JOBS) firmware-files
-	@tests/tools/firmware_report $(ELF) $(BOARD)
+	@tests/tools/firmware_report $(ELF)
 
 flash: firmware ## put it on a NUCLEO-G474RE with openocd, st-flash or dfu-util (TOOL=one of them)
 	@tests/tools/flash $(ELF:.elf=)
 
 misra: ## MISRA C:2012 over the firmware and the board's port; docs/misra.md has the deviations
 	@tests/tools/setup cppcheck
-	@tests/tools/misra $(BUILD)
+	@JOBS=$(JOBS) tests/tools/misra $(BUILD)
 
 campaign: setup ## break the simulated board in every way, alone and in pairs (MISSIONS=n SEED=n FAULT=text CSV=file)
 	@$(MAKE) --no-print-directory -j$(JOBS) $(BUILD)/tests/campaign/campaign

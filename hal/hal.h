@@ -37,6 +37,7 @@ struct hal_health {
     bool watchdog_reset;  /* why it started: the watchdog bit, */
     bool brown_out_reset; /* the supply of the electronics dipped, */
     bool crashed;         /* or a fault handler wrote a crash record */
+    bool brown_out_low;   /* the electronics' brown-out reset is set lower than the board wants it */
     uint32_t steps_late;  /* control steps that began after the next one was due, since start */
 };
 

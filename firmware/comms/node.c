@@ -169,7 +169,7 @@ static void fill_gap_vented(struct node *node, union message *message) {
 static uint32_t parameters_limited(const struct node *node) {
     const uint32_t limited = node->parameters_report.unknown + node->parameters_report.refused +
                              node->app.controller.status.calibration_limited;
-    return limited < 15u ? limited : 15u;
+    return limited < 7u ? limited : 7u;
 }
 
 static void fill_health(struct node *node, union message *message) {
@@ -185,6 +185,7 @@ static void fill_health(struct node *node, union message *message) {
                                 .clock_failed = health.clock_failed,
                                 .watchdog_reset = health.watchdog_reset,
                                 .brown_out_reset = health.brown_out_reset,
+                                .brown_out_low = health.brown_out_low,
                                 .crashed = health.crashed,
                                 .parameters_limited = (uint8_t)parameters_limited(node),
                                 .parameters_found = node->store.parameters_found,

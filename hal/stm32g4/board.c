@@ -4,6 +4,7 @@
 
 #include "stm32g4/clock.h"
 #include "stm32g4/conversions.h"
+#include "stm32g4/core.h"
 #include "stm32g4/faults.h"
 #include "stm32g4/flash.h"
 #include "stm32g4/pins.h"
@@ -15,15 +16,17 @@
 #include "stm32g4/valves.h"
 #include "stm32g4/watchdog.h"
 
+#define TIP_BYTES_A_CALL 64u /* 5.5 ms of them */
+
 /* The order of start; a crash record's address says which part did not. */
 enum part { PART_VALVES = 1, PART_TIME, PART_CONVERTER };
 
-static int64_t time_us(void *context) {
+static int64_t board_time_us(void *context) {
     const struct board *board = context;
     return board->time_us;
 }
 
-static bool read_pressures(void *context, struct hal_pressures *pressures) {
+static bool board_read_pressures(void *context, struct hal_pressures *pressures) {
     struct board *board = context;
     uint16_t raw[RAW_CHANNEL_COUNT];
     if (!pressure_adc_take(raw)) {
@@ -34,24 +37,35 @@ static bool read_pressures(void *context, struct hal_pressures *pressures) {
     return true;
 }
 
-/* The seam for the tip stream: bytes come from tip_uart_take(), with their times. */
-static bool read_tip(void *context, struct hal_tip_sample *sample) {
-    (void)context;
-    (void)sample;
-    return false;
+/* Bytes that wait, on the clock of the steps. */
+static void feed_tip_stream(struct board *board) {
+    uint8_t byte;
+    uint32_t arrived_us;
+    for (uint32_t i = 0; i < TIP_BYTES_A_CALL && tip_uart_take(&byte, &arrived_us); i++) {
+        const int32_t since_us = (int32_t)(arrived_us - (uint32_t)board->time_us);
+        tip_stream_byte(&board->tip_stream, byte, board->time_us + since_us);
+    }
 }
 
-static bool write_outputs(void *context, const struct hal_outputs *outputs) {
-    (void)context;
-    return valves_write(outputs);
+static bool board_read_tip(void *context, struct hal_tip_sample *sample) {
+    struct board *board = context;
+    feed_tip_stream(board);
+    return tip_stream_read(&board->tip_stream, sample);
 }
 
-static void read_health(void *context, struct hal_health *health) {
+static bool board_write_outputs(void *context, const struct hal_outputs *outputs) {
+    struct board *board = context;
+    board->outputs_set = valves_write(outputs);
+    return board->outputs_set;
+}
+
+static void board_read_health(void *context, struct hal_health *health) {
     const struct board *board = context;
     *health = (struct hal_health){.clock_failed = clock_crystal_failed(),
                                   .watchdog_reset = board->watchdog_reset,
                                   .brown_out_reset = board->brown_out_reset,
                                   .crashed = board->crashed,
+                                  .brown_out_low = board->brown_out_low,
                                   .steps_late = board->steps_late};
 }
 
@@ -79,11 +93,11 @@ static void take_reset_cause(struct board *board) {
 
 void board_start(struct board *board, uint32_t *clock_hz) {
     *board = (struct board){.hal = {.context = board,
-                                    .time_us = time_us,
-                                    .read_pressures = read_pressures,
-                                    .read_tip = read_tip,
-                                    .write_outputs = write_outputs,
-                                    .read_health = read_health}};
+                                    .time_us = board_time_us,
+                                    .read_pressures = board_read_pressures,
+                                    .read_tip = board_read_tip,
+                                    .write_outputs = board_write_outputs,
+                                    .read_health = board_read_health}};
     let_debugger_halt();
     watchdog_start();
     take_reset_cause(board);
@@ -94,9 +108,10 @@ void board_start(struct board *board, uint32_t *clock_hz) {
     need(time_base_start(*clock_hz), PART_TIME);
     need(pressure_adc_start(), PART_CONVERTER);
     board->reference_calibration = pressure_adc_calibration();
+    tip_stream_init(&board->tip_stream, TIP_STREAM_AGE_US);
     tip_uart_start(*clock_hz);
     board->storage_usable = flash_start(&board->storage);
-    board->brown_out_set = supply_monitor_brown_out_is_set();
+    board->brown_out_low = !supply_monitor_brown_out_is_set();
 }
 
 void board_run(struct board *board) {
@@ -114,11 +129,19 @@ void board_wait(struct board *board) {
     board->steps_late += stalled ? 0u : passed - 1u;
     board->time_us += (int64_t)passed * (int64_t)TIME_BASE_STEP_US;
     board->tick = tick;
+    board->outputs_set = false;
     can_step(board->time_us);
 }
 
 void board_completed(struct board *board, uint32_t state) {
     faults_mark_step(board->tick, state);
     time_base_completed(board->tick);
-    watchdog_feed(valves_enabled());
+    if (board->outputs_set) {
+        watchdog_feed(valves_enabled());
+    }
+}
+
+_Noreturn void board_reset(void) {
+    valves_shut();
+    core_reset();
 }

@@ -5,6 +5,7 @@
 #include <stdbool.h>
 #include <stdint.h>
 
+#include "comms/tip_stream.h"
 #include "hal.h"
 #include "stm32g4/can.h"
 #include "stm32g4/crash_record.h"
@@ -18,13 +19,15 @@ struct board {
     uint32_t steps_late;
     uint32_t steps_stalled; /* missed while the core's own flash bank was erased or written */
     uint32_t pressures_missed;
+    struct tip_stream tip_stream;
+    bool outputs_set; /* in the step that runs: what feeds the watchdog */
     bool watchdog_reset;
     bool brown_out_reset;
     bool crashed;
     struct crash_record crash; /* meaningful with crashed */
     bool bus_started;
     bool storage_usable;
-    bool brown_out_set; /* the option bytes have the brown-out reset where it belongs */
+    bool brown_out_low; /* the option bytes have the brown-out reset under 2.8 V */
     uint16_t reference_calibration;
 };
 
@@ -35,7 +38,10 @@ void board_start(struct board *board, uint32_t *clock_hz);
 void board_run(struct board *board);
 /* Sleep until the next step is due; then `board->time_us` is its time. */
 void board_wait(struct board *board);
-/* The step is complete, in supervisor state `state`. */
+/* The step is complete, in supervisor state `state`. Feeds the watchdog if the step could set its outputs:
+ * what cannot be set ends in a reset, which vents. */
 void board_completed(struct board *board, uint32_t state);
+/* Shut the valves and start again. */
+_Noreturn void board_reset(void);
 
 #endif

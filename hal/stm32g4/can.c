@@ -60,7 +60,7 @@ static void read_element(const struct fdcan_element *element, struct hal_can_fra
 
 static void write_element(struct fdcan_element *element, const struct hal_can_frame *frame) {
     uint32_t code = 0u;
-    (void)conversions_can_code(frame->length, &code); /* send() has seen that there is one */
+    (void)conversions_can_code(frame->length, &code); /* can_send() has seen that there is one */
     element->id = frame->extended ? FDCAN_ID_EXTENDED | frame->id : frame->id << FDCAN_ID_STANDARD_SHIFT;
     element->control = (code << FDCAN_CONTROL_LENGTH_SHIFT) |
                        (frame->fd ? FDCAN_CONTROL_FD | FDCAN_CONTROL_RATE_SWITCH : 0u);
@@ -117,7 +117,7 @@ void handler_fdcan1(void) {
 
 /* --- struct hal_bus --- */
 
-static bool receive(void *context, struct hal_can_frame *frame) {
+static bool can_receive(void *context, struct hal_can_frame *frame) {
     (void)context;
     if (received.taken == received.written) {
         return false;
@@ -134,7 +134,7 @@ static bool can_carry(const struct hal_can_frame *frame) {
            (frame->fd ? fd_enabled : frame->length <= CLASSIC_BYTES);
 }
 
-static bool send(void *context, const struct hal_can_frame *frame) {
+static bool can_send(void *context, const struct hal_can_frame *frame) {
     (void)context;
     if (!can_carry(frame)) {
         return false;
@@ -153,7 +153,7 @@ static bool send(void *context, const struct hal_can_frame *frame) {
     return true;
 }
 
-static void state(void *context, struct hal_can_state *state_now) {
+static void can_state(void *context, struct hal_can_state *state_now) {
     (void)context;
     const uint32_t protocol = FDCAN1->psr, counters = FDCAN1->ecr;
     *state_now = (struct hal_can_state){
@@ -252,7 +252,7 @@ static void set_interrupts(void) {
 }
 
 bool can_start(uint32_t clock_hz, const struct can_settings *settings, struct hal_bus *bus) {
-    *bus = (struct hal_bus){.context = NULL, .receive = receive, .send = send, .state = state};
+    *bus = (struct hal_bus){.context = NULL, .receive = can_receive, .send = can_send, .state = can_state};
     RCC->ccipr = (RCC->ccipr & ~RCC_CCIPR_FDCANSEL_MASK) | RCC_CCIPR_FDCANSEL_PCLK1;
     RCC->apb1enr1 |= RCC_APB1ENR1_FDCAN;
     (void)RCC->apb1enr1;

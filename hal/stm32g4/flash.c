@@ -35,7 +35,7 @@ static uint32_t address_of(enum hal_storage_area area, uint32_t offset) {
     return (uint32_t)(uintptr_t)areas[area].bytes + offset;
 }
 
-static const uint8_t *map(void *context, enum hal_storage_area area, uint32_t *bytes) {
+static const uint8_t *flash_map(void *context, enum hal_storage_area area, uint32_t *bytes) {
     (void)context;
     if ((uint32_t)area >= (uint32_t)HAL_STORAGE_AREA_COUNT) {
         *bytes = 0u;
@@ -61,7 +61,7 @@ static void finish(void) {
     running = false;
 }
 
-static enum hal_storage_status status(void *context) {
+static enum hal_storage_status flash_status(void *context) {
     (void)context;
     if (running && (FLASH->sr & FLASH_SR_BSY) != 0u) {
         return HAL_STORAGE_BUSY;
@@ -75,7 +75,7 @@ static enum hal_storage_status status(void *context) {
 /* Unlocked, with what an earlier operation left cleared. */
 static bool begin(enum hal_storage_area area, uint32_t offset) {
     if (!usable || (uint32_t)area >= (uint32_t)HAL_STORAGE_AREA_COUNT || offset >= areas[area].size ||
-        status(NULL) == HAL_STORAGE_BUSY) {
+        flash_status(NULL) == HAL_STORAGE_BUSY) {
         return false;
     }
     const bool own_bank = address_of(area, offset) < BANK_2;
@@ -90,7 +90,7 @@ static bool begin(enum hal_storage_area area, uint32_t offset) {
     return true;
 }
 
-static bool erase_page(void *context, enum hal_storage_area area, uint32_t offset) {
+static bool flash_erase_page(void *context, enum hal_storage_area area, uint32_t offset) {
     (void)context;
     if (!begin(area, offset)) {
         return false;
@@ -108,8 +108,8 @@ static uint32_t word_of(const uint8_t bytes[4]) {
            ((uint32_t)bytes[3] << 24);
 }
 
-static bool program(void *context, enum hal_storage_area area, uint32_t offset,
-                    const uint8_t word[HAL_STORAGE_WORD_BYTES]) {
+static bool flash_program(void *context, enum hal_storage_area area, uint32_t offset,
+                          const uint8_t word[HAL_STORAGE_WORD_BYTES]) {
     (void)context;
     if (offset % HAL_STORAGE_WORD_BYTES != 0u || !begin(area, offset)) {
         return false;
@@ -126,10 +126,10 @@ static bool program(void *context, enum hal_storage_area area, uint32_t offset,
 bool flash_start(struct hal_storage *storage) {
     usable = (FLASH->optr & FLASH_OPTR_DBANK) != 0u;
     *storage = (struct hal_storage){.context = NULL,
-                                    .map = map,
-                                    .erase_page = erase_page,
-                                    .program = program,
-                                    .status = status,
+                                    .map = flash_map,
+                                    .erase_page = flash_erase_page,
+                                    .program = flash_program,
+                                    .status = flash_status,
                                     .page_bytes = PAGE_BYTES};
     return usable;
 }

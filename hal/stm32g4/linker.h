@@ -12,6 +12,8 @@ extern uint32_t linker_data_end[];
 extern const uint32_t linker_data_image[];
 extern uint32_t linker_bss_start[];
 extern uint32_t linker_bss_end[];
+extern const uint8_t linker_code_start[];
+extern const uint8_t linker_code_end[];
 extern const uint8_t linker_table_a[];
 extern const uint8_t linker_table_a_end[]; /* of what was flashed */
 extern const uint8_t linker_table_b[];

@@ -7,7 +7,7 @@ work=$(mktemp -d)
 trap 'rm -rf "$work"' EXIT
 shown=$work/said
 
-report() { tests/tools/firmware_report "$elf" "$build/board" >"$work/said" 2>&1; }
+report() { tests/tools/firmware_report "$elf" >"$work/said" 2>&1; }
 report && grep -q 'flash, firmware and table' "$work/said"
 check flash_ram_and_stack_are_within_their_bounds $?
 FLASH_BOUND=200000 report
@@ -30,7 +30,7 @@ check nothing_allocates_or_prints $?
 # --- the stack tool, on small programs whose answer is known
 cat >"$work/indirect" <<'END'
 @table: leaf
-listed: @table
+case.c: @table
 END
 judge() { # code on stdin
     cat - >"$work/case.c"
@@ -38,8 +38,8 @@ judge() { # code on stdin
     cat >>"$work/case.c" <<'END'
 void faults_enter(void) {}
 END
-    arm-none-eabi-gcc -mcpu=cortex-m4 -mthumb -O1 -fstack-usage -fno-inline -fno-optimize-sibling-calls \
-        -c "$work/case.c" -o "$work/objects/case.o" || return 9
+    (cd "$work" && arm-none-eabi-gcc -mcpu=cortex-m4 -mthumb -O1 -fstack-usage -fno-inline -fno-optimize-sibling-calls \
+        -c case.c -o objects/case.o) || return 9
     arm-none-eabi-ld -e handler_reset "$work/objects/case.o" -o "$work/case.elf" || return 9
     tests/tools/stack_usage "$work/case.elf" "$work/objects" "$work/indirect" >"$work/said" 2>&1
 }
@@ -83,12 +83,13 @@ END
 sum=$(awk -F'\t' '{ n = $1; sub(/.*:/, "", n); size[n] = $2 } END { print size["handler_reset"] + size["listed"] + size["leaf"] + size["use"] }' "$work/objects/case.su")
 grep -q "^main $sum$" "$work/said"
 check a_listed_call_through_a_pointer_counts $?
+echo "other.c: leaf" >"$work/indirect"
 judge <<END
 int leaf(int x) { return x; }
 int (*volatile pointer)(int) = leaf;
 int stranger(void) { return pointer(1) + 1; }
 void handler_reset(void) { stranger(); }
 END
-[ $? -ne 0 ] && grep -q 'stranger calls through a pointer' "$work/said"
+[ $? -ne 0 ] && grep -q 'stranger (.*) calls through a pointer' "$work/said"
 check an_unlisted_call_through_a_pointer_is_refused $?
 check_end

@@ -129,7 +129,7 @@ $(BUILD)/tests/campaign/test_campaign: $(call object,$(CAMPAIGN_C))
 $(BUILD)/tests/campaign/campaign: $(call object,$(CAMPAIGN_MAIN) $(CAMPAIGN_C)) $(HOST_O) $(SIM_O) $(FIRMWARE_O) $(SHARED_O)
 	$(link) $(HOST_LIBS)
 $(BUILD)/tests/gap/test_blind_plant: $(call object,$(filter-out %/blind_truth.c,$(BLIND_C)))
-$(BUILD)/tests/board/test_conversions: $(call object,$(PORT_PURE_C))
+$(BUILD)/tests/board/test_conversions $(BUILD)/tests/board/test_port: $(call object,$(PORT_PURE_C))
 $(BUILD)/tests/%: $(BUILD)/tests/%.o $(SUPPORT_O) $(HOST_O) $(EMULATOR_O) $(SIM_O) $(FIRMWARE_O) $(SHARED_O)
 	$(link) -lcmocka $(EMULATOR_LIBS)
 
@@ -165,8 +165,10 @@ $(ELF:.elf=.hex): $(ELF)
 # from the hex file: of the ELF, objcopy would take an empty .data in RAM for the end of the image
 $(ELF:.elf=.bin): $(ELF:.elf=.hex)
 	@arm-none-eabi-objcopy -I ihex -O binary --gap-fill 0xff $< $@
+$(ELF:.elf=.stack): $(ELF) tests/tools/stack_usage hal/stm32g4/indirect_calls
+	@tests/tools/stack_usage $< $(BOARD) hal/stm32g4/indirect_calls >$@
 .PHONY: firmware-files
-firmware-files: $(ELF) $(ELF:.elf=.hex) $(ELF:.elf=.bin)
+firmware-files: $(ELF) $(ELF:.elf=.stack) $(ELF:.elf=.hex) $(ELF:.elf=.bin)
 -include $(patsubst %.c,$(BOARD)/%.d,$(FIRMWARE_C) $(BOARD_C))
 
 # --- lint: every compiler that the firmware must build with, then the analysers
@@ -187,7 +189,7 @@ lint-board:
 	@set -e; for c in "clang $(BOARD_CLANG) -O2" "arm-none-eabi-gcc $(ARM_CORE) -O2"; do for f in $(BOARD_C); do \
 	    $$c $(FIRMWARE_FLAGS) -c $$f -o /dev/null || { echo "lint: $$c rejects $$f"; exit 1; }; done; done
 lint-misra:
-	@tests/tools/misra $(BUILD)
+	@JOBS=$(JOBS) tests/tools/misra $(BUILD)
 lint-clang:
 	@set -e; for f in $(HOST_SIDE_C); do clang -O1 $(COMMON_FLAGS) $(MPI_FLAGS) -Wno-unknown-pragmas -Wno-source-uses-openmp \
 	    -fopenmp -fsyntax-only $$f; done
