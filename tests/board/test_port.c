@@ -116,7 +116,7 @@ static void send_pressures(float pressure_pa) {
 
 /* The next HEALTH that the board sends. */
 static struct message_health health(void) {
-    struct message_health message;
+    struct message_health message = {0};
     struct can_host_heard heard;
     struct message_trouble trouble = {0};
     while (board_receive(&board, &heard)) {
@@ -300,6 +300,42 @@ static void outputs_that_cannot_be_set_end_in_a_reset(void **state) {
     assert_false(board.wiring.coils_driven);
 }
 
+static void a_full_bus_of_foreign_frames_costs_the_step_nothing(void **state) {
+    (void)state;
+    const struct hal_can_frame foreign = {.id = 0x0f7u,
+                                          .length = 0u}; /* node 7's, and ahead of our telemetry */
+    move();
+    watch_steps();
+    can_host_flood(&board.host, &foreign);
+    for (int i = 0; i < 5; i++) {
+        board_run(&board, 100000);
+    }
+    assert_in_range(watched_steps.count, 499, 501);
+    assert_in_range(watched_steps.longest_us, 1000, 1010);
+    can_host_flood(&board.host, NULL);
+    board_run(&board, 50000);
+    assert_int_equal(health().steps_late, 0);
+}
+
+static bool is_off(void) {
+    return board.fdcan.node.bus_off;
+}
+
+static bool is_back(void) {
+    return !board.fdcan.node.bus_off;
+}
+
+static void bus_off_ends_a_tenth_of_a_second_after_it_began(void **state) {
+    (void)state;
+    board_run(&board, START_US);
+    can_bus_set_wire(&board.bus, CAN_BUS_SHORTED);
+    (void)run_until(is_off, 1000000);
+    can_bus_set_wire(&board.bus, CAN_BUS_SOUND);
+    assert_in_range(run_until(is_back, 300000), 95000, 110000); /* 100 ms, and 129 x 11 bits */
+    assert_int_equal(look_u32("bus_off_count"), 1);
+    assert_int_equal(health().steps_late, 0); /* telemetry is back, too */
+}
+
 static void the_stack_is_as_deep_as_the_build_says_at_most(void **state) {
     (void)state;
     move();
@@ -335,6 +371,8 @@ int main(void) {
         cmocka_unit_test_setup_teardown(a_dip_of_the_electronics_supply_shuts_everything, begin, end),
         cmocka_unit_test_setup_teardown(a_brown_out_reset_that_is_set_too_low_is_said, begin, end),
         cmocka_unit_test_setup_teardown(outputs_that_cannot_be_set_end_in_a_reset, begin, end),
+        cmocka_unit_test_setup_teardown(a_full_bus_of_foreign_frames_costs_the_step_nothing, begin, end),
+        cmocka_unit_test_setup_teardown(bus_off_ends_a_tenth_of_a_second_after_it_began, begin, end),
         cmocka_unit_test_setup_teardown(the_stack_is_as_deep_as_the_build_says_at_most, begin, end),
     };
     return cmocka_run_group_tests(tests, open_table, close_table);
