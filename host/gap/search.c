@@ -40,6 +40,10 @@
 #define FAINT 1.5             /* mean square below which a first effect, too, must explain most of what there is */
 #define PART_COST 0.03        /* an effect more must better the fit by that to go before, ... */
 #define FORM_COST 0.003       /* ... a form more of the same by that */
+#define REVISIONS 3
+#define DISBELIEVED 0.1       /* an effect that its rivals leave so little belief gives way to the best of them */
+#define DOUBTED 0.65          /* a further effect that its rivals leave less is left out, if the others .. */
+#define EXPLAINED_SHARE 0.03  /* .. leave no more than that of the gap by themselves */
 #define SHORTLIST 10          /* of the candidates that act on the gas; the best variant of each kind besides */
 
 struct candidate {
@@ -744,6 +748,54 @@ static bool take_repeats(struct search *search, size_t step) {
     return sound && recalibrate(search, &search->best, true);
 }
 
+static double belief_in_held(const struct search *search, const struct rivals *rivals) {
+    const struct effect_kind *held = search->best.model.effect[rivals->place].kind;
+    for (size_t i = 0; i < rivals->count; i++) {
+        if (rivals->rival[i].kind == held) {
+            return rivals->rival[i].belief;
+        }
+    }
+    return 0.0;
+}
+
+/* What the comparison with rivals asks for: the rival that is believed in an effect's place, or the model without an effect that
+ * could as well be others and is not needed. NULL: nothing. */
+static const struct fit *ask_rivals(const struct search *search) {
+    const double all = structure(&search->recalibrated);
+    for (size_t r = 0; r < search->rivals_count; r++) {
+        const struct rivals *rivals = &search->rivals[r];
+        const bool by_chance = search->best.model.effect[rivals->place].kind->by_chance;
+        if (!by_chance && rivals->count > 1 && belief_in_held(search, rivals) < DISBELIEVED) {
+            return &rivals->rival[0].fit;
+        }
+    }
+    for (size_t r = 0; r < search->rivals_count; r++) {
+        const struct rivals *rivals = &search->rivals[r];
+        const bool by_chance = search->best.model.effect[rivals->place].kind->by_chance;
+        if (!by_chance && rivals->rest.sound && rivals->rest.model.count > 0 && belief_in_held(search, rivals) < DOUBTED &&
+            structure(&rivals->rest) < STRUCTURE_LEAST + EXPLAINED_SHARE * all) {
+            return &rivals->rest;
+        }
+    }
+    return NULL;
+}
+
+/* Rivals are compared under the final weights: what they show may overturn what the search took on its way. */
+static bool compare_rivals(struct search *search) {
+    bool sound = true;
+    for (size_t round = 0; round <= REVISIONS && sound && !stopped(search) && search->best.model.count > 0; round++) {
+        say(search, "rivals", round, REVISIONS);
+        sound = rivals_find(search);
+        const struct fit *asked = sound && round < REVISIONS ? ask_rivals(search) : NULL;
+        if (asked == NULL) {
+            break;
+        }
+        search->best = *asked;
+        sound = recalibrate(search, &search->best, true);
+    }
+    return sound;
+}
+
 /* What the best model leaves of the gap. */
 static double share_left(const struct search *search) {
     return structure(&search->best) / fmax(structure(&search->recalibrated), STRUCTURE_LEAST);
@@ -830,10 +882,7 @@ bool search_run(struct search *search, const struct gap_data *data, const struct
         drop_idle(search);
         sound = recalibrate(search, &search->best, true);
     }
-    if (sound && !stopped(search) && search->best.model.count > 0) {
-        say(search, "rivals", 0, 1);
-        sound = rivals_find(search);
-    }
+    sound = sound && compare_rivals(search);
     sound = sound && fit_everything(search);
     search->interrupted = stopped(search);
     free(room);
