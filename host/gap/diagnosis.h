@@ -33,7 +33,7 @@ struct diagnosis_interval {
 struct diagnosis_effect {
     const struct effect_kind *kind;
     size_t form;
-    size_t place;   /* in the search's best model */
+    size_t place; /* in the search's best model */
     size_t chamber;
     double onset_s;
     double probability;
@@ -49,11 +49,12 @@ struct diagnosis_gap {
     double after_recalibration;
     double after_effect;
     double floor;
-    double low[DIAGNOSIS_MODELS];  /* 90 % of the three figures, in their order: blocks of time resampled */
+    double low[DIAGNOSIS_MODELS]; /* 90 % of the three figures, in their order: blocks of time resampled */
     double high[DIAGNOSIS_MODELS];
 };
 
-/* What else was tried, each kind by its best: in place of the last effect, or alone where the verdict names none. */
+/* What else was tried, each kind by its best: in place of the last effect, or alone where the verdict names
+ * none. */
 struct diagnosis_alternative {
     const struct effect *effect;
     double probability;
@@ -68,7 +69,7 @@ struct diagnosis_closest {
 
 struct diagnosis {
     enum gap_verdict verdict;
-    const char *stage;      /* of the locus; "" where there is none */
+    const char *stage; /* of the locus; "" where there is none */
     bool chamber[3];
     char regime[DIAGNOSIS_TEXT_BYTES];
     size_t effects;
@@ -81,15 +82,16 @@ struct diagnosis {
     struct diagnosis_interval stiffness_scale;
     struct diagnosis_interval supply_scale;
     struct diagnosis_gap gap[DIAGNOSIS_RESIDUALS];
-    struct diagnosis_interval closed;                /* share of the gap closed by everything */
-    struct diagnosis_interval closed_recalibration;  /* by recalibration alone */
+    struct diagnosis_interval closed;               /* share of the gap closed by everything */
+    struct diagnosis_interval closed_recalibration; /* by recalibration alone */
     double structure[3];    /* share of noise floor squared that is left: nominal, recalibrated, best */
     const char *rest_stage; /* where the best model leaves most */
     bool rest_chamber[3];
-    struct dependences dependences;                  /* where inside a stage; of the best model too where that is no explanation */
-    char description[DIAGNOSIS_TEXT_BYTES];          /* of an unknown gap */
-    struct direction direction;                      /* which way the gap goes while a pressure is held */
-    size_t closest;                                  /* of an unknown gap: what comes nearest, best first */
+    struct dependences
+        dependences; /* where inside a stage; of the best model too where that is no explanation */
+    char description[DIAGNOSIS_TEXT_BYTES]; /* of an unknown gap */
+    struct direction direction;             /* which way the gap goes while a pressure is held */
+    size_t closest;                         /* of an unknown gap: what comes nearest, best first */
     struct diagnosis_closest closest_model[DIAGNOSIS_CLOSEST_MAX];
     char next_experiment[DIAGNOSIS_TEXT_BYTES];
     size_t warnings;
@@ -99,6 +101,7 @@ struct diagnosis {
 const char *gap_verdict_name(enum gap_verdict verdict);
 /* Draws the conclusions. False: out of memory. */
 bool diagnosis_conclude(struct diagnosis *diagnosis, struct search *search);
-void diagnosis_warn(struct diagnosis *diagnosis, const char *format, ...) __attribute__((format(printf, 2, 3)));
+void diagnosis_warn(struct diagnosis *diagnosis, const char *format, ...)
+    __attribute__((format(printf, 2, 3)));
 
 #endif

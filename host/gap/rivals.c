@@ -28,7 +28,8 @@ static bool names_kind(const struct gap_model *model, const struct effect_kind *
 static void leave_out(const struct gap_model *model, size_t place, struct gap_model *rest) {
     const struct effect_kind *kind = model->effect[place].kind;
     const bool bends = strcmp(kind->name, "tip_distortion") == 0;
-    *rest = (struct gap_model){.stiffness_scale = model->stiffness_scale, .supply_scale = model->supply_scale};
+    *rest =
+        (struct gap_model){.stiffness_scale = model->stiffness_scale, .supply_scale = model->supply_scale};
     for (size_t e = 0; e < model->count; e++) {
         if (model->effect[e].kind != kind && !(bends && gap_model_is_part(model, e))) {
             rest->effect[rest->count++] = model->effect[e];
@@ -36,7 +37,8 @@ static void leave_out(const struct gap_model *model, size_t place, struct gap_mo
     }
 }
 
-/* The trial's first effect of a kind that the rest does not name; NULL: none, or several kinds, or it lacks some of the rest. */
+/* The trial's first effect of a kind that the rest does not name; NULL: none, or several kinds, or it lacks
+ * some of the rest. */
 static const struct effect *own_effect(const struct fit *fit, const struct gap_model *rest) {
     const struct effect *own = NULL;
     size_t met = 0;
@@ -52,7 +54,8 @@ static const struct effect *own_effect(const struct fit *fit, const struct gap_m
     return met < rest->count ? NULL : own;
 }
 
-/* The trials that a kind is judged by: on top of the rest where that was tried, else alone; of these the best. */
+/* The trials that a kind is judged by: on top of the rest where that was tried, else alone; of these the
+ * best. */
 struct entry {
     const struct fit *fit;
     const struct effect *own;
@@ -80,8 +83,8 @@ static int by_merit(const void *a, const void *b) {
     return goes_before(x, y) ? -1 : goes_before(y, x);
 }
 
-static size_t gather(const struct search *search, const struct gap_model *rest, const struct effect_kind *kept,
-                     struct entry *list) {
+static size_t gather(const struct search *search, const struct gap_model *rest,
+                     const struct effect_kind *kept, struct entry *list) {
     const struct gap_model none = {.count = 0};
     size_t count = 0;
     for (size_t t = 0; t < search->trials; t++) {
@@ -93,7 +96,8 @@ static size_t gather(const struct search *search, const struct gap_model *rest, 
         if (entry.own == NULL && search->trial[t].step == 0) {
             entry = (struct entry){fit, own_effect(fit, &none), true};
         }
-        if (entry.own != NULL && entry.own->kind != kept && !entry.own->kind->by_chance && !names_kind(rest, entry.own->kind)) {
+        if (entry.own != NULL && entry.own->kind != kept && !entry.own->kind->by_chance &&
+            !names_kind(rest, entry.own->kind)) {
             offer(list, &count, &entry);
         }
     }
@@ -102,7 +106,8 @@ static size_t gather(const struct search *search, const struct gap_model *rest, 
 }
 
 /* The rest with the entry's own effects, from the onset of the one that they stand in for. */
-static bool put_in_place(const struct gap_model *rest, const struct entry *entry, double onset_s, struct gap_model *model) {
+static bool put_in_place(const struct gap_model *rest, const struct entry *entry, double onset_s,
+                         struct gap_model *model) {
     *model = *rest;
     if (entry->alone) {
         model->stiffness_scale = entry->fit->model.stiffness_scale;
@@ -136,12 +141,14 @@ static int by_belief(const void *a, const void *b) {
 }
 
 /* The logarithm of how much less the rival's residuals of one group speak for it than the best one's. */
-static double misfit(const struct fit *rival, const struct fit *without, const struct fit *least, enum fit_group group) {
+static double misfit(const struct fit *rival, const struct fit *without, const struct fit *least,
+                     enum fit_group group) {
     const struct fit_part *own = &rival->sums.part[1][group], *best = &least->sums.part[1][group];
     const double count = fmax(best->count, 1.0), structure = fit_structure_of(&least->sums, 1, group);
     const double noise = fmax(best->square / count - structure, 0.1);
     const double taken_off = fmax(without->sums.part[1][group].square - best->square, 0.0);
-    return (own->square - best->square) / (FORM_SHARE * taken_off + structure * count + NOISE_SQUARES * noise);
+    return (own->square - best->square) /
+           (FORM_SHARE * taken_off + structure * count + NOISE_SQUARES * noise);
 }
 
 static void weigh(struct rivals *rivals, const struct fit *without, const struct fit *best) {
@@ -152,7 +159,8 @@ static void weigh(struct rivals *rivals, const struct fit *without, const struct
     }
     for (size_t i = 0; i < rivals->count; i++) {
         struct rival *rival = &rivals->rival[i];
-        rival->belief = -misfit(&rival->fit, without, least, FIT_PRESSURE) - misfit(&rival->fit, without, least, FIT_TIP) -
+        rival->belief = -misfit(&rival->fit, without, least, FIT_PRESSURE) -
+                        misfit(&rival->fit, without, least, FIT_TIP) -
                         0.5 * log(parameters_of(&rival->fit.model, rival->kind));
         most = fmax(most, rival->belief);
     }
@@ -189,12 +197,16 @@ static void find_in_place(struct search *search, struct rivals *rivals, struct e
         *rival = (struct rival){.kind = list[i].own->kind};
         rivals->count += put_in_place(&rest, &list[i], held->onset_s, &rival->fit.model);
     }
-    struct fit without = {.model = rest};
-#pragma omp parallel for schedule(dynamic, 1) num_threads(search->options.threads > 0 ? search->options.threads : omp_get_max_threads())
-    for (size_t i = 0; i < rivals->count; i++) { /* the best model is fitted already: in its turn, the rest alone */
+    struct fit *without = &rivals->rest;
+    *without = (struct fit){.model = rest};
+#pragma omp parallel for schedule(dynamic, 1)                                                                \
+    num_threads(search->options.threads > 0 ? search->options.threads : omp_get_max_threads())
+    for (size_t i = 0; i < rivals->count;
+         i++) { /* the best model is fitted already: in its turn, the rest alone */
         const bool stopped = search->options.stop != NULL && *search->options.stop != 0;
         if (!stopped) {
-            (void)fit_rebased(&search->replay, &search->coarse, i == 0 ? &without : &rivals->rival[i].fit, ROUNDS);
+            (void)fit_rebased(&search->replay, &search->coarse, i == 0 ? without : &rivals->rival[i].fit,
+                              ROUNDS);
         }
     }
     drop_unsound(rivals);
@@ -202,7 +214,7 @@ static void find_in_place(struct search *search, struct rivals *rivals, struct e
         const struct effect *own = own_effect(&rivals->rival[i].fit, &rest);
         rivals->rival[i].effect = own != NULL ? *own : rivals->rival[i].effect;
     }
-    weigh(rivals, without.sound ? &without : &search->recalibrated, &search->best);
+    weigh(rivals, without->sound ? without : &search->recalibrated, &search->best);
 }
 
 bool rivals_find(struct search *search) {

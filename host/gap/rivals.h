@@ -18,6 +18,7 @@ struct rivals {
     size_t place; /* in the best model */
     size_t count;
     struct rival rival[RIVALS_MAX]; /* the most believed first; the best model's own kind is one of them */
+    struct fit rest;                /* the best model without any in this place, fitted anew */
 };
 
 struct search;

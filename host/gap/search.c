@@ -27,8 +27,11 @@
 #define ONSETS 12
 #define ONSET_LEAVES 0.5      /* of the structure, at most */
 #define ONSET_ROUNDS 4
+#define ONSET_FINE_ROUNDS 2
 #define UNEXPLAINED_SHARE 0.1 /* of the gap, that an effect without one may leave */
 #define LATE_SHARE 0.03       /* of the gap, that an effect with an onset may leave */
+#define LAST_PART 0.6         /* of a run: what comes after it is the last part */
+#define PLACED_MAX 3          /* of what is found there, of which onsets are sought */
 #define ONSET_FINE_S 0.15     /* an onset is not sought closer than that */
 #define COMPLETING_SHARE 0.5  /* of what is left, that a further effect must explain */
 #define POLISH_SHARE 0.025    /* of the gap, in pressures or at the tip: less than that is left by any form of the right effect */
@@ -40,6 +43,10 @@
 #define FAINT 1.5             /* mean square below which a first effect, too, must explain most of what there is */
 #define PART_COST 0.03        /* an effect more must better the fit by that to go before, ... */
 #define FORM_COST 0.003       /* ... a form more of the same by that */
+#define REVISIONS 3
+#define DISBELIEVED 0.1       /* an effect that its rivals leave so little belief gives way to the best of them */
+#define DOUBTED 0.65          /* a further effect that its rivals leave less is left out, if the others .. */
+#define EXPLAINED_SHARE 0.03  /* .. leave no more than that of the gap by themselves */
 #define SHORTLIST 10          /* of the candidates that act on the gas; the best variant of each kind besides */
 
 struct candidate {
@@ -514,40 +521,41 @@ static void set_onset(struct gap_model *model, size_t e, double onset_s) {
     }
 }
 
-/* When did each effect set in? Tried on a grid, kept where it explains more. */
+/* An onset within a block that is held out shows in that block only, and one outside in none of these. */
+static double all_squares(const struct fit *fit) {
+    return fit->sound ? fit_squares(&fit->sums, 0) + fit_squares(&fit->sums, 1) : INFINITY;
+}
+
+/* The same effect from each of these onsets; the best of them. */
+static const struct fit *try_onsets(struct crew *crew, const struct fit *start, size_t e, double first_s, double step_s, int rounds,
+                                    struct fit trial[ONSETS]) {
+    size_t best = 0;
+#pragma omp parallel for schedule(dynamic, 1) num_threads(crew->count)
+    for (size_t k = 0; k < ONSETS; k++) {
+        trial[k] = *start;
+        set_onset(&trial[k].model, e, fmax(first_s + step_s * (double)k, 0.0));
+        fitter_run(&crew->fitter[omp_get_thread_num()], &trial[k], rounds, true);
+    }
+    for (size_t k = 1; k < ONSETS; k++) {
+        best = all_squares(&trial[k]) < all_squares(&trial[best]) ? k : best;
+    }
+    return &trial[best];
+}
+
+/* When did each effect set in? Tried on a grid, then closer and closer; kept where it explains more. */
 static void find_onset(struct crew *crew, double end_s, size_t e, struct fit *fit) {
     struct fit trial[ONSETS];
     const struct fit before = *fit;
-#pragma omp parallel for schedule(dynamic, 1) num_threads(crew->count)
-    for (size_t k = 0; k < ONSETS; k++) {
-        trial[k] = before;
-        set_onset(&trial[k].model, e, end_s * (double)(k + 1) / (ONSETS + 1.0));
-        fitter_run(&crew->fitter[omp_get_thread_num()], &trial[k], ONSET_ROUNDS, true);
-    }
     double width_s = end_s / (ONSETS + 1.0);
-    while (width_s > ONSET_FINE_S) {
-        size_t best = 0;
-        for (size_t k = 1; k < ONSETS; k++) {
-            best = held_out(&trial[k]) < held_out(&trial[best]) ? k : best;
-        }
-        if (!is_better(fit, &trial[best])) {
-            break;
-        }
-        *fit = trial[best];
+    const struct fit *best = try_onsets(crew, &before, e, width_s, width_s, ONSET_ROUNDS, trial);
+    if (!is_better(&before, best)) {
+        return;
+    }
+    for (*fit = *best; width_s > ONSET_FINE_S; width_s *= 0.4) {
         const struct fit centre = *fit;
-        const double middle_s = centre.model.effect[e].onset_s;
-#pragma omp parallel for schedule(dynamic, 1) num_threads(crew->count)
-        for (size_t k = 0; k < ONSETS; k++) {
-            trial[k] = centre;
-            set_onset(&trial[k].model, e, fmax(middle_s + width_s * (2.0 * (double)k / (ONSETS - 1.0) - 1.0), 0.0));
-            fitter_run(&crew->fitter[omp_get_thread_num()], &trial[k], 1, true);
-        }
-        for (size_t k = 0; k < ONSETS; k++) {
-            if (held_out(&trial[k]) < held_out(fit)) {
-                *fit = trial[k];
-            }
-        }
-        width_s *= 0.4;
+        const double first_s = centre.model.effect[e].onset_s - width_s;
+        best = try_onsets(crew, &centre, e, first_s, 2.0 * width_s / (ONSETS - 1.0), ONSET_FINE_ROUNDS, trial);
+        *fit = all_squares(best) < all_squares(fit) ? *best : *fit;
     }
     /* a real onset leaves little; a form that is somewhat off gains a little by any */
     if (before.model.effect[e].onset_s == 0.0 && structure(fit) > ONSET_LEAVES * structure(&before)) {
@@ -744,6 +752,54 @@ static bool take_repeats(struct search *search, size_t step) {
     return sound && recalibrate(search, &search->best, true);
 }
 
+static double belief_in_held(const struct search *search, const struct rivals *rivals) {
+    const struct effect_kind *held = search->best.model.effect[rivals->place].kind;
+    for (size_t i = 0; i < rivals->count; i++) {
+        if (rivals->rival[i].kind == held) {
+            return rivals->rival[i].belief;
+        }
+    }
+    return 0.0;
+}
+
+/* What the comparison with rivals asks for: the rival that is believed in an effect's place, or the model without an effect that
+ * could as well be others and is not needed. NULL: nothing. */
+static const struct fit *ask_rivals(const struct search *search) {
+    const double all = structure(&search->recalibrated);
+    for (size_t r = 0; r < search->rivals_count; r++) {
+        const struct rivals *rivals = &search->rivals[r];
+        const bool by_chance = search->best.model.effect[rivals->place].kind->by_chance;
+        if (!by_chance && rivals->count > 1 && belief_in_held(search, rivals) < DISBELIEVED) {
+            return &rivals->rival[0].fit;
+        }
+    }
+    for (size_t r = 0; r < search->rivals_count; r++) {
+        const struct rivals *rivals = &search->rivals[r];
+        const bool by_chance = search->best.model.effect[rivals->place].kind->by_chance;
+        if (!by_chance && rivals->rest.sound && rivals->rest.model.count > 0 && belief_in_held(search, rivals) < DOUBTED &&
+            structure(&rivals->rest) < STRUCTURE_LEAST + EXPLAINED_SHARE * all) {
+            return &rivals->rest;
+        }
+    }
+    return NULL;
+}
+
+/* Rivals are compared under the final weights: what they show may overturn what the search took on its way. */
+static bool compare_rivals(struct search *search) {
+    bool sound = true;
+    for (size_t round = 0; round <= REVISIONS && sound && !stopped(search) && search->best.model.count > 0; round++) {
+        say(search, "rivals", round, REVISIONS);
+        sound = rivals_find(search);
+        const struct fit *asked = sound && round < REVISIONS ? ask_rivals(search) : NULL;
+        if (asked == NULL) {
+            break;
+        }
+        search->best = *asked;
+        sound = recalibrate(search, &search->best, true);
+    }
+    return sound;
+}
+
 /* What the best model leaves of the gap. */
 static double share_left(const struct search *search) {
     return structure(&search->best) / fmax(structure(&search->recalibrated), STRUCTURE_LEAST);
@@ -760,26 +816,78 @@ static void try_from(struct search *search, struct workspace *room, double onset
     search->onset_s = 0.0;
 }
 
+static void forget_blocks(struct replay *replay, size_t at, size_t blocks, size_t channels) {
+    for (size_t k = 0; k < (size_t)(LAST_PART * (double)blocks) * channels; k++) {
+        replay->weight[at + k] = 0.0;
+    }
+}
+
+/* Until the weights are tuned again, only the last part of each run counts. */
+static void look_at_last_part(struct search *search) {
+    for (size_t i = 0; i < search->replay.runs; i++) {
+        const struct replay_run *run = &search->replay.run[i];
+        forget_blocks(&search->replay, run->pressure_at, run->blocks, 3);
+        forget_blocks(&search->replay, run->supply_at, run->blocks, 1);
+        forget_blocks(&search->replay, run->tip_at, run->tip_blocks, REPLAY_TIP_CHANNELS);
+    }
+    replay_follow(&search->coarse, &search->replay);
+}
+
+/* The onsets of what was found without them; better than `least`, and the best becomes it. */
+static void place_onsets(struct search *search, const struct workspace *room, struct fit *least) {
+    struct fit_base base;
+    struct crew crew = {NULL, 0};
+    const double end_s = longest_s(search->data);
+    if (fit_base_open(&base, &search->replay, &search->coarse, &search->recalibrated.model) && crew_open(&crew, search, &base)) {
+        for (size_t i = 0; i < room->singles && i < PLACED_MAX && !stopped(search); i++) {
+            struct fit fit = room->single[i];
+            fit.model.stiffness_scale = search->recalibrated.model.stiffness_scale;
+            fit.model.supply_scale = search->recalibrated.model.supply_scale;
+            fitter_run(&crew.fitter[0], &fit, ONSET_ROUNDS, true);
+            find_onset(&crew, end_s, 0, &fit);
+            if (fit.sound && held_out(&fit) < held_out(least)) {
+                *least = fit;
+            }
+        }
+    }
+    crew_close(&crew);
+    fit_base_close(&base);
+}
+
+/* An effect that set in before the last part of the runs acts throughout it: there it is found as if it always did. */
+static bool try_last_part(struct search *search, struct workspace *room, struct fit *least) {
+    look_at_last_part(search);
+    bool sound = compare_again(search);
+    search->best = search->recalibrated;
+    room->singles = 0;
+    (void)(sound && add_one(search, room, 0));
+    sound = sound && recalibrate(search, &search->recalibrated, true);
+    if (sound) {
+        place_onsets(search, room, least);
+    }
+    return sound;
+}
+
 /* An effect that sets in late is taken for another while candidates act from the start. Where much is left, all are tried
- * again from the onset that was found, or where none was, from a third and from two thirds of the recording on. */
+ * again from the onset that was found, or where none was, on the last part of the recording. */
 static bool search_after_onset(struct search *search, struct workspace *room) {
     const struct fit before = search->best;
     const double left = share_left(search);
-    const bool late = before.model.effect[0].onset_s > 0.0;
+    const bool late = before.model.count > 0 && before.model.effect[0].onset_s > 0.0;
     if (left < (late ? LATE_SHARE : UNEXPLAINED_SHARE) || structure(&before) < STRUCTURE_LEAST || stopped(search)) {
         return true;
     }
     bool sound = recalibrate(search, &search->recalibrated, true);
     struct fit least = search->recalibrated;
-    const double end_s = longest_s(search->data);
-    for (size_t i = 0; i < (late ? 1 : 2) && sound && !stopped(search); i++) {
-        try_from(search, room, late ? before.model.effect[0].onset_s : end_s * (double)(i + 1) / 3.0, &least);
+    if (late && sound) {
+        try_from(search, room, before.model.effect[0].onset_s, &least);
     }
+    sound = sound && try_last_part(search, room, &least);
     search->best = least;
-    sound = sound && least.model.count > 0 && recalibrate(search, &search->best, true);
-    if (!sound || share_left(search) > left) {
+    sound = sound && (least.model.count == 0 || recalibrate(search, &search->best, true));
+    if (!sound || least.model.count == 0 || share_left(search) > left) {
         search->best = before;
-        sound = recalibrate(search, &search->best, true);
+        sound = sound && recalibrate(search, &search->best, true);
     }
     return sound;
 }
@@ -830,10 +938,7 @@ bool search_run(struct search *search, const struct gap_data *data, const struct
         drop_idle(search);
         sound = recalibrate(search, &search->best, true);
     }
-    if (sound && !stopped(search) && search->best.model.count > 0) {
-        say(search, "rivals", 0, 1);
-        sound = rivals_find(search);
-    }
+    sound = sound && compare_rivals(search);
     sound = sound && fit_everything(search);
     search->interrupted = stopped(search);
     free(room);

@@ -68,6 +68,29 @@ static void effect_from_mid_run_has_its_onset(void **state) {
     diagnosed_close(&diagnosed);
 }
 
+/* While an effect is taken to act from the start, one that sets in half way looks like several others. */
+static void effect_that_sets_in_late_is_not_taken_for_another(void **state) {
+    static const char *const late[] = {"chamber_asymmetry:gain=1.07,azimuth=-0.0228,chamber=3,onset=8",
+                                       "gravity:angle=0.4,weight_scale=0.75,onset=8"};
+    static const char *const name[] = {"chamber_asymmetry", "gravity"};
+    (void)state;
+    for (size_t i = 0; i < 2; i++) {
+        diagnosed_open(&diagnosed, &(struct recording){.effect = {late[i]}, .seconds = 16.0, .seed = 2}, NULL);
+        assert_verdict(diagnosis, GAP_EFFECT);
+        assert_string_equal(diagnosis->effect[0].kind->name, name[i]);
+        assert_close(diagnosis->effect[0].onset_s, 8.0, 0.3);
+        diagnosed_close(&diagnosed);
+    }
+}
+
+/* More than the largest volume: the fit ends at the bound, and what it ends at is not named. */
+static void size_at_its_bound_is_not_believed(void **state) {
+    (void)state;
+    diagnose("line_volume:volume=8e-6", "line_volume:volume=4e-7", NULL);
+    assert_verdict(diagnosis, GAP_UNKNOWN);
+    diagnosed_close(&diagnosed);
+}
+
 /* All sensors too high is a supply, a stiffness and a valve that are off together: either is said to be possible, or the right
  * one is named, but no wrong one with certainty. */
 static void gain_of_all_sensors_is_not_taken_for_another(void **state) {
@@ -167,7 +190,10 @@ static void stop_ends_the_search_soon(void **state) {
 int main(void) {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(two_effects_are_both_named),           cmocka_unit_test(effect_that_is_left_out_is_not_named),
-        cmocka_unit_test(effect_from_mid_run_has_its_onset),    cmocka_unit_test(gain_of_all_sensors_is_not_taken_for_another),
+        cmocka_unit_test(effect_from_mid_run_has_its_onset),
+        cmocka_unit_test(effect_that_sets_in_late_is_not_taken_for_another),
+        cmocka_unit_test(size_at_its_bound_is_not_believed),
+        cmocka_unit_test(gain_of_all_sensors_is_not_taken_for_another),
         cmocka_unit_test(any_number_of_threads_says_the_same), cmocka_unit_test(stop_ends_the_search_soon)};
     return cmocka_run_group_tests(tests, recording_set_up, recording_tear_down);
 }
