@@ -14,7 +14,7 @@ SHELL    := /bin/bash
 MAKEFLAGS += --no-builtin-rules
 include tests/tools/build.mk
 
-.PHONY: help setup all demo test bench gap-check firmware flash misra campaign docs-faults lint format tables clean
+.PHONY: help setup all demo test bench gap-check firmware flash misra hil campaign docs-faults lint format tables clean
 
 help: ## list these targets
 	@grep -hE '^[a-z-]+:.*## ' Makefile | awk -F ':.*## ' '{printf "  make %-10s %s\n", $$1, $$2}'
@@ -51,6 +51,10 @@ flash: firmware ## put it on a NUCLEO-G474RE with openocd, st-flash or dfu-util 
 misra: ## MISRA C:2012 over the firmware and the board's port; docs/misra.md has the deviations
 	@tests/tools/setup cppcheck
 	@JOBS=$(JOBS) tests/tools/misra $(BUILD)
+
+hil: setup ## the flashed ELF on the emulated board: in virtual time, then on real CAN sockets inside user-mode Linux
+	@$(MAKE) --no-print-directory -j$(JOBS) all test-programs firmware-files
+	@tests/tools/run_tests $(BUILD) hil
 
 campaign: setup ## break the simulated board in every way, alone and in pairs (MISSIONS=n SEED=n FAULT=text CSV=file)
 	@$(MAKE) --no-print-directory -j$(JOBS) $(BUILD)/tests/campaign/campaign

@@ -14,8 +14,9 @@
 #define SUPPLY_FULL_PA 100000.0
 #define FIRST_ROOM 16384u
 
-static const char *const names[] = {"time_s", "valve1",    "valve2",     "valve3",     "p1_pa",     "p2_pa",
-                                    "p3_pa",  "supply_pa", "p1_true_pa", "p2_true_pa", "p3_true_pa"};
+static const char *const names[] = {"time_s",     "valve1",     "valve2",     "valve3",
+                                    "p1_pa",      "p2_pa",      "p3_pa",      "supply_pa",
+                                    "p1_true_pa", "p2_true_pa", "p3_true_pa", "bend_true_rad"};
 #define COLUMNS (sizeof names / sizeof names[0])
 
 static double *next_row(struct board_record *record) {
@@ -49,6 +50,7 @@ void board_record_row(struct board_record *record, struct board *board) {
     }
     row[7] = pressure_of(board, 3, SUPPLY_FULL_PA);
     board_pressures(board, row + 8);
+    row[11] = hypot(board->wiring.plant.shape.bend_x_rad, board->wiring.plant.shape.bend_y_rad);
 }
 
 bool board_record_finish(struct board_record *record, const char *path, const struct bend_table *table,

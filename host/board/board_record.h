@@ -1,5 +1,6 @@
 /* A run log of the emulated board: what its sensors show and its outputs do, a row a millisecond, and the
- * true pressures in columns of their own (p1_true_pa ..). In memory until it is written. */
+ * true pressures and bend in columns of their own (p1_true_pa .., bend_true_rad, anew with each tip sample).
+ * In memory until it is written. */
 #ifndef TRIBEND_BOARD_RECORD_H
 #define TRIBEND_BOARD_RECORD_H
 

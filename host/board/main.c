@@ -12,6 +12,7 @@
 #include "board/board_changes.h"
 #include "board/can_socket.h"
 #include "cli/commands.h"
+#include "comms/tip_stream.h"
 #include "units/units.h"
 
 #define FIRMWARE "build/firmware/tribend.elf"
@@ -252,12 +253,19 @@ static int use(struct session *session, const struct bend_table *table) {
     return code;
 }
 
+static size_t encode_tip(const struct hal_tip_sample *sample, uint8_t bytes[WIRING_RECORD_BYTES]) {
+    tip_stream_encode(sample, bytes);
+    return TIP_STREAM_RECORD_BYTES;
+}
+_Static_assert(TIP_STREAM_RECORD_BYTES <= WIRING_RECORD_BYTES, "a record fits the line's");
+
 static int open_and_use(struct session *session, const struct bend_table *table) {
     const struct settings *settings = session->settings;
     struct board_setup setup;
     char error[PROGRAM_ERROR_BYTES];
     board_default_setup(&setup, settings->elf, table);
     setup.seed = settings->seed;
+    setup.encode = encode_tip;
     if (!board_open(&session->board, &setup, error, sizeof error)) {
         return program_fail(EXIT_BAD_INPUT, "%s", error);
     }

@@ -4,9 +4,10 @@ JOBS := $(shell nproc 2>/dev/null || echo 1)
 
 BUILD_PACKAGES := gcc libc6-dev pkg-config libgmsh-dev libsuitesparse-dev libgsl-dev libcyaml-dev libyaml-dev \
                   libopenmpi-dev openmpi-bin zlib1g-dev libjansson-dev libcmocka-dev calculix-ccx gnuplot-nox fonts-dejavu-core \
-                  $(FIRMWARE_PACKAGES) $(EMULATOR_PACKAGES)
+                  $(FIRMWARE_PACKAGES) $(EMULATOR_PACKAGES) $(HIL_PACKAGES)
 FIRMWARE_PACKAGES := gcc-arm-none-eabi libnewlib-arm-none-eabi
 EMULATOR_PACKAGES := libunicorn-dev qemu-system-arm
+HIL_PACKAGES := user-mode-linux can-utils kmod iproute2
 LINT_PACKAGES  := clang clang-tidy cppcheck
 
 # --- sources: a folder is a layer; arrows between layers are include paths below
