@@ -54,12 +54,14 @@ static bool is_calibrated(size_t at) {
            (at >= loop + from[1] && at < loop + sizeof(struct pressure_loop_parameters));
 }
 
-/* Padding before a member that is aligned to eight bytes. */
+/* What aligns a time, or the end, to eight bytes. */
 static bool is_padding(size_t at) {
-    return at == offsetof(struct parameters, controller.idle_pressure_pa) + 4u ||
-           at == offsetof(struct parameters, controller.limits.table_bytes_per_step) + 4u ||
-           at == offsetof(struct parameters, controller.calibration.reading_lag_s[2]) + 4u ||
-           at == offsetof(struct parameters, node.telemetry_slowdown) + 4u;
+    bool before_time = at + 4u == sizeof(struct parameters);
+    for (uint32_t i = 0; i < (uint32_t)PARAMETER_COUNT; i++) {
+        const struct parameter_row *row = parameter_row((enum parameter_index)i);
+        before_time = before_time || (row->type == PARAMETER_TYPE_TIME && row->at == at + 4u);
+    }
+    return before_time && at % 8u == 4u;
 }
 
 /* A tunable that is added to a struct and not to the table is found here: its bytes belong to no row. What a

@@ -206,6 +206,32 @@ static void a_save_that_the_storage_fails_is_said_to_have_failed(void **state) {
     assert_false(store.save_failed);
 }
 
+/* Erased places, a first save that was cut, an old image beside a torn one: nothing was lost. Two torn ones: it was. */
+static void parameters_are_lost_only_where_both_places_are_damaged(void **state) {
+    (void)state;
+    sim_storage_init(&storage, SLOT_BYTES);
+    start();
+    assert_false(store_parameters_lost(&store));
+    storage.cut_after = 4u;
+    storage.tear = SIM_TEAR_GARBAGE;
+    save(2u, 1.02f);
+    restart();
+    assert_false(store.parameters_found);
+    assert_false(store_parameters_lost(&store));
+    save(2u, 1.02f);
+    save(3u, 1.03f);
+    restart();
+    assert_false(store_parameters_lost(&store));
+    storage.parameters[0][20] ^= 1u;
+    restart();
+    assert_true(store.parameters_found);
+    assert_false(store_parameters_lost(&store));
+    storage.parameters[1][20] ^= 1u;
+    restart();
+    assert_true(store_parameters_lost(&store));
+    assert_close(saved(), 11.0, 1e-6);
+}
+
 static void without_storage_nothing_is_kept_and_nothing_breaks(void **state) {
     (void)state;
     struct parameters parameters;
@@ -626,6 +652,7 @@ int main(void) {
         cmocka_unit_test(saved_parameters_are_there_after_a_restart),
         cmocka_unit_test(a_cut_save_leaves_the_old_or_the_new_parameters_whole),
         cmocka_unit_test(a_save_that_the_storage_fails_is_said_to_have_failed),
+        cmocka_unit_test(parameters_are_lost_only_where_both_places_are_damaged),
         cmocka_unit_test(without_storage_nothing_is_kept_and_nothing_breaks),
         cmocka_unit_test(a_transferred_table_is_there_after_a_restart),
         cmocka_unit_test(a_table_that_was_flashed_counts_until_one_is_committed),

@@ -7,7 +7,7 @@
 #include "hal.h"
 
 #define SIM_STORAGE_PAGE 256u
-#define SIM_STORAGE_PARAMETERS_BYTES 1024u
+#define SIM_STORAGE_PARAMETERS_BYTES 2048u
 #define SIM_STORAGE_TABLE_BYTES (800u * 256u)
 
 /* What a word or page holds after power failed while it was written or erased. */
