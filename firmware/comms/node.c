@@ -564,7 +564,6 @@ static void command(struct node *node, enum message_id id, const struct controll
 
 static void take_vent(struct node *node) {
     const struct controller_command vent = {.kind = COMMAND_VENT};
-    node->last.kind = COMMAND_NONE;
     command(node, MESSAGE_VENT, &vent);
 }
 
@@ -643,7 +642,6 @@ static bool take_clear(struct node *node, const struct message_clear *message) {
     if (!may_command(node, MESSAGE_CLEAR) || !sequence_goes_on(node, MESSAGE_CLEAR, message->sequence)) {
         return false;
     }
-    node->last.kind = COMMAND_NONE;
     command(node, MESSAGE_CLEAR, &clear);
     return true;
 }

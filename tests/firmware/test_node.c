@@ -968,6 +968,9 @@ static void a_motion_of_the_same_step_counts(void **state) {
     start();
     put_bend(0.3f, 0.0f);
     assert_int_equal(request(MESSAGE_PARAMETER_SET, &set).status, PARAMETER_NOT_NOW);
+    start();
+    put_pressure(1000.0f);
+    assert_int_equal(request(MESSAGE_PARAMETER_SET, &set).status, PARAMETER_NOT_NOW);
 }
 
 static void nothing_moves_while_parameters_are_saved(void **state) {
