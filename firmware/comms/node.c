@@ -401,6 +401,30 @@ static void fall_due(struct node *node, enum report_index report) {
     want(node, report);
 }
 
+/* --- refusals */
+
+static bool refuse(struct node *node, enum message_id id, enum node_refusal reason) {
+    struct node_refused *refused = &node->refused[reason];
+    refused->count++;
+    refused->step = node->app.controller.step;
+    refused->message = message_row(id)->number;
+    node->counters.refused++;
+    node->refusal_next = (uint32_t)reason;
+    want(node, REPORT_REFUSALS);
+    return false;
+}
+
+/* What was handed over counts as accepted unless the controller says no. */
+static void note_refusal(struct node *node) {
+    const uint32_t refused = node->app.controller.status.commands_refused;
+    if (node->given != MESSAGE_COUNT && refused != node->refused_before) {
+        node->counters.accepted--;
+        (void)refuse(node, node->given, NODE_REFUSED_CONTROLLER);
+    }
+    node->given = MESSAGE_COUNT;
+    node->refused_before = refused;
+}
+
 static void count_down(struct node *node) {
     for (uint32_t r = 0; r < (uint32_t)REPORT_COUNT; r++) {
         if (node->countdown[r] == 0u) {
@@ -489,25 +513,13 @@ static void send_reports(struct node *node) {
 }
 
 void node_report(struct node *node) {
+    note_refusal(node);
     count_down(node);
     note_tip(node);
     note_changes(node);
     if (node->setup->bus != NULL) {
         send_reports(node);
     }
-}
-
-/* --- refusals */
-
-static bool refuse(struct node *node, enum message_id id, enum node_refusal reason) {
-    struct node_refused *refused = &node->refused[reason];
-    refused->count++;
-    refused->step = node->app.controller.step;
-    refused->message = message_row(id)->number;
-    node->counters.refused++;
-    node->refusal_next = (uint32_t)reason;
-    want(node, REPORT_REFUSALS);
-    return false;
 }
 
 /* --- motion */
@@ -519,10 +531,12 @@ static bool is_vented(const struct node *node) {
 }
 
 /* The sequence of commands must go on: by one, or by some where frames were lost. After a pause any will do:
- * a host that was started anew. */
+ * a host that was started anew. A sender that is frozen makes no pause. */
 static bool sequence_goes_on(struct node *node, enum message_id id, uint8_t sequence) {
     const uint8_t ahead = (uint8_t)(sequence - node->sequence);
-    if (node->sequence_known && node->sequence_age < node->timeout_steps) {
+    const bool paused = node->sequence_age >= node->timeout_steps;
+    node->sequence_age = 0u;
+    if (node->sequence_known && !paused) {
         if (ahead == 0u || ahead >= SEQUENCE_AHEAD) {
             return refuse(node, id, NODE_REFUSED_STALE);
         }
@@ -530,7 +544,6 @@ static bool sequence_goes_on(struct node *node, enum message_id id, uint8_t sequ
     }
     node->sequence_known = true;
     node->sequence = sequence;
-    node->sequence_age = 0u;
     return true;
 }
 
@@ -543,33 +556,41 @@ static bool may_command(struct node *node, enum message_id id) {
     return kind == COMMAND_VENT ? refuse(node, id, NODE_REFUSED_STATE) : true;
 }
 
-static void command(struct node *node, const struct controller_command *given) {
+static void command(struct node *node, enum message_id id, const struct controller_command *given) {
     app_command(&node->app, given);
+    node->given = id;
     node->counters.accepted++;
 }
 
 static void take_vent(struct node *node) {
     const struct controller_command vent = {.kind = COMMAND_VENT};
-    node->last.kind = COMMAND_NONE;
-    command(node, &vent);
+    command(node, MESSAGE_VENT, &vent);
+}
+
+/* The supervisor is to know of a stream of commands that goes on while nothing may move: it must pause before
+ * it is obeyed again. Said again, a command starts nothing. */
+static bool refuse_by_state(struct node *node, enum message_id id, const struct controller_command *given) {
+    struct controller_command seen = *given;
+    seen.said_again = true;
+    if (node->app.pending.kind == COMMAND_NONE && given->kind != COMMAND_HOLD) {
+        app_command(&node->app, &seen);
+    }
+    return refuse(node, id, NODE_REFUSED_STATE);
 }
 
 static bool move(struct node *node, enum message_id id, uint8_t sequence,
                  const struct controller_command *given) {
     const enum supervisor_state state = node->app.controller.supervisor.state;
     const bool runs = supervisor_valves_enabled(&node->app.controller.supervisor);
-    if (!may_command(node, id)) {
+    if (!may_command(node, id) || !sequence_goes_on(node, id, sequence)) {
         return false;
     }
     if (!runs && !(state == SUPERVISOR_SAFE && given->kind != COMMAND_HOLD)) {
-        return refuse(node, id, NODE_REFUSED_STATE);
-    }
-    if (!sequence_goes_on(node, id, sequence)) {
-        return false;
+        return refuse_by_state(node, id, given);
     }
     node->last = *given;
     node->last.said_again = true;
-    command(node, given);
+    command(node, id, given);
     return true;
 }
 
@@ -621,8 +642,7 @@ static bool take_clear(struct node *node, const struct message_clear *message) {
     if (!may_command(node, MESSAGE_CLEAR) || !sequence_goes_on(node, MESSAGE_CLEAR, message->sequence)) {
         return false;
     }
-    node->last.kind = COMMAND_NONE;
-    command(node, &clear);
+    command(node, MESSAGE_CLEAR, &clear);
     return true;
 }
 
@@ -922,6 +942,7 @@ void node_init(struct node *node, const struct node_setup *setup) {
                                                   not_a_number()};
     node->tip_orientation = nohow;
     node->state_reported = SUPERVISOR_STATE_COUNT;
+    node->given = MESSAGE_COUNT;
 }
 
 /* --- words */

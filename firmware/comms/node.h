@@ -38,7 +38,9 @@
     X(NO_TABLE, "no valid bend table: pressure commands only")                                               \
     X(BUSY, "a save, a transfer or another request is under way: try again")                                 \
     X(BROADCAST, "only VENT and IDENTIFY go to every board")                                                 \
-    X(DUPLICATE_NODE, "another board on the bus has this node's id")
+    X(DUPLICATE_NODE, "another board on the bus has this node's id")                                         \
+    X(CONTROLLER,                                                                                            \
+      "a cause of the fault is still there, or commands that went on through a fault must pause for 0.5 s")
 enum node_refusal {
 #define NODE_REFUSAL_ENUM(NAME, text) NODE_REFUSED_##NAME,
     NODE_REFUSALS(NODE_REFUSAL_ENUM) NODE_REFUSAL_COUNT
@@ -110,7 +112,9 @@ struct node {
     struct controller_command last; /* that a heartbeat keeps alive */
     bool sequence_known;
     uint8_t sequence;
-    uint32_t sequence_age; /* steps since a command was accepted */
+    uint32_t sequence_age;   /* steps since a command came, taken or not */
+    enum message_id given;   /* what was handed to the controller in this step; MESSAGE_COUNT: nothing */
+    uint32_t refused_before; /* by the controller */
     uint32_t timeout_steps;
     struct hal_can_state bus_state;
     uint32_t pending; /* reports to send, a bit each */

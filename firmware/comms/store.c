@@ -287,6 +287,16 @@ uint32_t store_room(const struct store *store) {
     return (STORE_BUFFER_BYTES - (store->transfer.received - store->written)) / CHUNK_BYTES * CHUNK_BYTES;
 }
 
+/* The sender is told when enough has moved, and when all is there. */
+static void note_progress(struct store *store) {
+    struct store_transfer *transfer = &store->transfer;
+    const uint32_t moved = transfer->received + store->written - store->reported;
+    if (moved >= REPORT_BYTES || (moved > 0u && transfer->received == transfer->bytes)) {
+        store->reported += moved;
+        transfer->report_due = true;
+    }
+}
+
 void store_data(struct store *store, uint8_t chunk, uint64_t data) {
     struct store_transfer *transfer = &store->transfer;
     if (store->phase != STORE_RECEIVE || transfer->received == transfer->bytes) {
@@ -303,10 +313,7 @@ void store_data(struct store *store, uint8_t chunk, uint64_t data) {
         store->buffer.bytes[transfer->received % STORE_BUFFER_BYTES] = (uint8_t)(data >> (8u * i));
         transfer->received++;
     }
-    if (transfer->received - store->reported >= REPORT_BYTES || transfer->received == transfer->bytes) {
-        store->reported = transfer->received;
-        transfer->report_due = true;
-    }
+    note_progress(store);
 }
 
 void store_end(struct store *store, uint32_t crc) {
@@ -414,6 +421,7 @@ static void write_next_word(struct store *store) {
                  waiting < WORD ? waiting : WORD);
     if (program(store, store->written, word)) {
         store->written += waiting < WORD ? waiting : WORD;
+        note_progress(store); /* there is more room */
     }
 }
 

@@ -115,7 +115,7 @@ struct store {
     uint32_t written;
     uint32_t erased;
     bool commit_erased;
-    uint32_t reported;
+    uint32_t reported; /* of bytes received and written */
     uint32_t checked;
     uint32_t crc;
     uint32_t inner_crc;
@@ -139,7 +139,8 @@ bool store_table(const struct store *store, const uint8_t **image, uint32_t *byt
 enum parameters_image_status store_parameters(const struct store *store, const struct bend_table *table,
                                               struct parameters *parameters,
                                               struct parameters_image_report *report);
-/* Both places hold something, and neither is whole: parameters were there and are lost. No power failure makes that. */
+/* Both places hold something, and neither is whole: parameters were there and are lost. No power failure
+ * makes that. */
 bool store_parameters_lost(const struct store *store);
 /* The table that the controller runs (NULL: none), for what depends on it. */
 void store_set_running(struct store *store, const struct bend_table *running);
