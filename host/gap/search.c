@@ -551,11 +551,13 @@ static void find_onset(struct crew *crew, double end_s, size_t e, struct fit *fi
     if (!is_better(&before, best)) {
         return;
     }
-    for (*fit = *best; width_s > ONSET_FINE_S; width_s *= 0.4) {
+    *fit = *best;
+    while (width_s > ONSET_FINE_S) {
         const struct fit centre = *fit;
         const double first_s = centre.model.effect[e].onset_s - width_s;
         best = try_onsets(crew, &centre, e, first_s, 2.0 * width_s / (ONSETS - 1.0), ONSET_FINE_ROUNDS, trial);
         *fit = all_squares(best) < all_squares(fit) ? *best : *fit;
+        width_s *= 0.4;
     }
     /* a real onset leaves little; a form that is somewhat off gains a little by any */
     if (before.model.effect[e].onset_s == 0.0 && structure(fit) > ONSET_LEAVES * structure(&before)) {
