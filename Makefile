@@ -29,6 +29,7 @@ demo: setup ## from the material to a bent tip, with pictures (sets up what is m
 	@tests/tools/demo $(BUILD)
 
 test: setup ## build and run every test (sets up what is missing first)
+	@tests/tools/setup $(TEST_PACKAGES)
 	@$(MAKE) --no-print-directory -j$(JOBS) all test-programs firmware-files
 	@tests/tools/run_tests $(BUILD)
 

@@ -21,6 +21,7 @@ int cli_gap(int argc, char **argv);
 int cli_effects(int argc, char **argv);
 int cli_run(int argc, char **argv);
 int cli_board(int argc, char **argv);
+int cli_view(int argc, char **argv);
 /* `tribend gap plan` */
 int gap_plan_run(int argc, char **argv);
 /* `tribend gap close` */

@@ -4,10 +4,14 @@ JOBS := $(shell nproc 2>/dev/null || echo 1)
 
 BUILD_PACKAGES := gcc libc6-dev pkg-config libgmsh-dev libsuitesparse-dev libgsl-dev libcyaml-dev libyaml-dev \
                   libopenmpi-dev openmpi-bin zlib1g-dev libjansson-dev libcmocka-dev calculix-ccx gnuplot-nox fonts-dejavu-core \
-                  $(FIRMWARE_PACKAGES) $(EMULATOR_PACKAGES) $(HIL_PACKAGES)
+                  $(FIRMWARE_PACKAGES) $(EMULATOR_PACKAGES) $(HIL_PACKAGES) $(VIEW_PACKAGES)
 FIRMWARE_PACKAGES := gcc-arm-none-eabi libnewlib-arm-none-eabi
 EMULATOR_PACKAGES := libunicorn-dev qemu-system-arm
 HIL_PACKAGES := user-mode-linux can-utils kmod iproute2
+# npm brings the page's plotting library. Who has npm from elsewhere keeps it: Debian's would not go beside it.
+VIEW_PACKAGES := libmicrohttpd-dev $(if $(shell command -v npm),,npm)
+# what `make test` alone needs
+TEST_PACKAGES  := chromium curl
 LINT_PACKAGES  := clang clang-tidy cppcheck
 
 # --- sources: a folder is a layer; arrows between layers are include paths below
@@ -59,7 +63,7 @@ EMULATOR_O := $(call object,$(EMULATOR_C))
 MODEL_O    := $(call object,$(MODEL_C))
 SHARED_O    := $(call object,$(SHARED_C))
 TABLES_CLI_O := $(call object,$(TABLES_CLI_C))
-HOST_O     := $(call object,$(HOST_C))
+HOST_O     := $(call object,$(HOST_C)) $(BUILD)/host/view/view_files.o
 EMULATED_O := $(call object,$(EMULATED_C))
 SUPPORT_O  := $(call object,$(SUPPORT_C))
 
@@ -71,7 +75,7 @@ SELFTEST_ELF := $(BUILD)/tests/hil/selftest.elf
 BENCH_PROGRAMS := $(patsubst %.c,$(BUILD)/%,$(BENCH_C))
 
 EMULATOR_LIBS = -lunicorn $(HOST_LIBS)
-HOST_LIBS  := -ljansson -lcyaml -lyaml -fopenmp -lm
+HOST_LIBS  := -lmicrohttpd -ljansson -lcyaml -lyaml -fopenmp -pthread -lm
 MODEL_LIBS := $(shell pkg-config --libs mpi-c 2>/dev/null) -lgmsh -lcholmod -lgsl -lgslcblas -lcyaml -lyaml -lz -fopenmp -lm
 
 # V=1 shows the commands in full.
@@ -95,6 +99,22 @@ $(BUILD)/tests/gap/share/%.o: tests/gap/share/%.c
 $(BUILD)/%.o: %.c
 	@mkdir -p $(@D)
 	$(say)$(CC) $(OPTIMISE) $(SANITIZE_FLAGS) $(COMMON_FLAGS) -MMD -MP -c $< -o $@
+
+# --- the live view: its page is built in, with the plotting library that npm fetches as the lock file says
+VIEW_PAGE  := $(wildcard host/view/page/*.html host/view/page/*.css host/view/page/*.js)
+UPLOT      := $(BUILD)/view/node_modules/uplot/dist
+# what was left empty for want of npm is tried again
+ifneq ($(shell command -v npm),)
+$(shell test -s $(UPLOT)/uPlot.iife.min.js || rm -f $(UPLOT)/uPlot.iife.min.js)
+endif
+$(UPLOT)/uPlot.iife.min.js: host/view/page/package.json host/view/page/package-lock.json
+	@mkdir -p $(BUILD)/view && cp $^ $(BUILD)/view/
+	@tests/tools/npm_packages $(BUILD)/view || { mkdir -p $(@D) && : >$@ && : >$(@D)/uPlot.min.css; \
+	    echo "tribend: without npm the live view is left out, \`tribend view\` will say so; the rest is whole" >&2; }
+	@touch $@
+$(BUILD)/host/view/view_files.o: host/view/view_files.S $(VIEW_PAGE) $(UPLOT)/uPlot.iife.min.js
+	@mkdir -p $(@D)
+	$(say)$(CC) -DUPLOT_JS='"$(UPLOT)/uPlot.iife.min.js"' -DUPLOT_CSS='"$(UPLOT)/uPlot.min.css"' -c $< -o $@
 
 link = $(if $(V),,@echo '  link $@';) $(CC) $(SANITIZE_FLAGS) $(filter %.o,$^) -o $@
 
