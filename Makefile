@@ -22,7 +22,7 @@ help: ## list these targets
 setup: ## install the Debian packages that are missing (root or sudo; else prints the apt line)
 	@tests/tools/setup $(BUILD_PACKAGES)
 
-all: $(PROGRAMS) ## build the programs: tribend-tables and tribend
+all: $(PROGRAMS) $(MANUAL) ## build the programs: tribend-tables and tribend
 
 demo: setup ## from the material to a bent tip, with pictures (sets up what is missing first)
 	@$(MAKE) --no-print-directory -j$(JOBS) all

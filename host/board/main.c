@@ -15,7 +15,7 @@
 #include "comms/tip_stream.h"
 #include "units/units.h"
 
-#define FIRMWARE "build/firmware/tribend.elf"
+#define FIRMWARE "firmware/tribend.elf"
 #define SLICE_US 1000
 #define BEHIND_NS 200000000 /* so far behind the clock it starts anew */
 #define STEP_FUNCTION "node_step"
@@ -33,7 +33,7 @@ struct settings {
 };
 
 static const struct argp_option options[] = {
-    {"elf", 'E', "FILE", 0, "what is flashed (default " FIRMWARE ")", 1},
+    {"elf", 'E', "FILE", 0, "what is flashed (default: " FIRMWARE " beside this program)", 1},
     {"bus", 'b', "BUS", 0, "CAN of the board: an interface such as can0, unix:PATH, or none (default)", 1},
     {"speed", 'v', "1|max", 0,
      "1: in real time (default with a bus); max: as fast as it goes (default without)", 1},

@@ -21,7 +21,8 @@ static void print_kind(const struct effect_kind *kind) {
 
 int cli_effects(int argc, char **argv) {
     const struct argp parser = {NULL, NULL, NULL,
-                                "List the effects that --effect adds to the simulated module and that `tribend gap` looks for.",
+                                "List the effects that --effect adds to the simulated module and that `tribend gap` looks for.\v"
+                                "Example: tribend effects",
                                 NULL, NULL, NULL};
     argp_err_exit_status = EXIT_USAGE;
     if (argp_parse(&parser, argc, argv, 0, NULL, NULL) != 0) {

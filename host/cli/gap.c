@@ -186,7 +186,8 @@ static int run_diagnose(int argc, char **argv) {
     struct arguments arguments = {.count = 0};
     const struct argp parser = {option_list, parse, "RUN.csv...",
                                 "Say where the gap between model and module lies, which effect causes it, and how far it "
-                                "shrinks once that effect is added.",
+                                "shrinks once that effect is added.\v"
+                                "Example: tribend gap diagnose RUN.csv --html GAP.html --calibration-out FOUND.yaml",
                                 NULL, NULL, NULL};
     static struct gap_data data;
     struct table_file file;

@@ -68,7 +68,8 @@ static const struct argp parser = {
     option_list, parse, "RUN.csv",
     "Follow the command of RUN.csv again on a simulated module that is as the calibration says: with a controller that does "
     "not know the calibration (before) and with one that does (after), and on the nominal module (without gap). Errors are "
-    "those of the true bend or the true pressures.",
+    "those of the true bend or the true pressures.\v"
+    "Example: tribend gap close RUN.csv --calibration FOUND.yaml",
     NULL, NULL, NULL};
 
 /* --- the figures --- */

@@ -33,7 +33,7 @@ static error_t parse(int key, char *argument, struct argp_state *state) {
     }
 }
 
-static const struct argp parser = {options, parse, "RUN.csv", "Draw a recorded run.", NULL, NULL, NULL};
+static const struct argp parser = {options, parse, "RUN.csv", "Draw a recorded run.\vExample: tribend plot RUN.csv -o RUN.png", NULL, NULL, NULL};
 
 int cli_plot(int argc, char **argv) {
     struct arguments arguments = {.log = NULL};

@@ -76,7 +76,8 @@ static error_t parse(int key, char *argument, struct argp_state *state) {
 
 static const struct argp parser = {options, parse, "MODULE",
                                    "Build the bend table of MODULE (a name from tables/modules or a YAML file), on "
-                                   "every core of this machine, or with mpirun -n RANKS on many machines.",
+                                   "every core of this machine, or with mpirun -n RANKS on many machines.\v"
+                                   "Example: tribend-tables build paper-semicircle -o paper-semicircle.tbt",
                                    NULL, NULL, NULL};
 
 static double seconds(void) {

@@ -126,7 +126,8 @@ static error_t parse(int key, char *argument, struct argp_state *state) {
 
 static const struct argp parser = {options, parse, "TENSILE.csv[:MODE]...",
                                    "Fit a material law to tensile tests by least squares of the nominal stress. MODE says "
-                                   "how a specimen was pulled: uniaxial (default), shear or equibiaxial.",
+                                   "how a specimen was pulled: uniaxial (default), shear or equibiaxial.\v"
+                                   "Example: tribend-tables fit TENSILE.csv --law all -o my-material.yaml",
                                    NULL, NULL, NULL};
 
 static void print_fit(const struct material_fit *fit) {

@@ -43,7 +43,8 @@ static error_t parse(int key, char *argument, struct argp_state *state) {
 
 static const struct argp parser = {options, parse, "MATERIAL",
                                    "Say over which stretch the law of MATERIAL (a name from tables/materials or a YAML "
-                                   "file) may be used.",
+                                   "file) may be used.\v"
+                                   "Example: tribend-tables material ecoflex-0030-measured",
                                    NULL, NULL, NULL};
 
 void material_report_stability(const struct material *material) {

@@ -39,7 +39,7 @@ static error_t parse(int key, char *argument, struct argp_state *state) {
     }
 }
 
-static const struct argp parser = {options, parse, "FILE.tbt", "Draw a bend table.", NULL, NULL, NULL};
+static const struct argp parser = {options, parse, "FILE.tbt", "Draw a bend table.\vExample: tribend-tables plot TABLE.tbt -o TABLE.png", NULL, NULL, NULL};
 
 static void bend_at(const struct bend_table *table, double p1, double p2, double p3, double bend_deg[2]) {
     const float pressure_pa[3] = {(float)p1, (float)p2, (float)p3};

@@ -356,7 +356,8 @@ static void print_silent(void) {
     }
 }
 
-static const struct argp parser = {NULL, NULL, NULL, "Hold the solver against the founding paper's figures.", NULL,
+static const struct argp parser = {NULL, NULL, NULL, "Hold the solver against the founding paper's figures.\v"
+                                   "Example: tribend-tables published", NULL,
                                    NULL, NULL};
 
 int cli_published(int argc, char **argv) {

@@ -101,7 +101,8 @@ static error_t parse(int key, char *argument, struct argp_state *state) {
 static const struct argp parser = {options, parse, "MODULE P1 P2 P3",
                                    "Where the tip of MODULE goes at three chamber pressures under its own weight, a payload "
                                    "and a force at the tip, beside the pose without any. Ends are rigid, without end "
-                                   "correction.",
+                                   "correction.\v"
+                                   "Example: tribend-tables rod paper-semicircle 60mbar 0mbar 0mbar --payload 2g",
                                    NULL, NULL, NULL};
 
 static void print_pose(const char *name, const struct rod_state *rod) {

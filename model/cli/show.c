@@ -38,7 +38,7 @@ static error_t parse(int key, char *argument, struct argp_state *state) {
     }
 }
 
-static const struct argp parser = {options, parse, "FILE.tbt", "Print what a bend table holds.", NULL, NULL, NULL};
+static const struct argp parser = {options, parse, "FILE.tbt", "Print what a bend table holds.\vExample: tribend-tables show TABLE.tbt", NULL, NULL, NULL};
 
 static void print_tags(const struct bend_table *table) {
     static const struct {

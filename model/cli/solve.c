@@ -90,7 +90,8 @@ static error_t parse(int key, char *argument, struct argp_state *state) {
 
 static const struct argp parser = {options, parse, "MODULE",
                                    "Follow the equilibria of MODULE (a name from tables/modules or a YAML file) under "
-                                   "rising pressure, through limit points.",
+                                   "rising pressure, through limit points.\v"
+                                   "Example: tribend-tables solve paper-semicircle --chamber 1 --to 90deg",
                                    NULL, NULL, NULL};
 
 struct report {

@@ -59,7 +59,8 @@ static error_t parse(int key, char *argument, struct argp_state *state) {
 
 static const struct argp parser = {options, parse, "MODULE RUN.csv",
                                    "Fit the stiffness of MODULE's rubber to every second pressure plateau of a run without "
-                                   "load, and judge it on the others, beside a straight line of bend to pressure.",
+                                   "load, and judge it on the others, beside a straight line of bend to pressure.\v"
+                                   "Example: tribend-tables stiffness stiff-flop RUN.csv",
                                    NULL, NULL, NULL};
 
 static void print_fit(const struct plateau *plateaus, size_t count, const struct stiffness_fit *fit) {

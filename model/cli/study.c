@@ -80,7 +80,8 @@ static error_t parse(int key, char *argument, struct argp_state *state) {
 
 static const struct argp parser = {options, parse, "wall|length|area|shape",
                                    "Reproduce a parametric study of Elsayed et al. 2014, figure 6: the pressure of one "
-                                   "chamber for a bend, and how much the section balloons.",
+                                   "chamber for a bend, and how much the section balloons.\v"
+                                   "Example: tribend-tables study wall -o study-wall",
                                    NULL, NULL, NULL};
 
 /* One shape's points lie together. */

@@ -7,6 +7,8 @@
 #include <string.h>
 #include <unistd.h>
 
+#include "program/version.h"
+
 volatile sig_atomic_t program_interrupted = 0;
 
 static const char *program_name = "tribend";
@@ -36,15 +38,30 @@ int program_fail(int code, const char *format, ...) {
     return code;
 }
 
+static bool find_beside(const char *folder, const char *between, const char *relative,
+                        char path[PROGRAM_PATH_BYTES]) {
+    char beside[2 * PROGRAM_PATH_BYTES];
+    (void)snprintf(beside, sizeof beside, "%s%s/%s", folder, between, relative);
+    if (access(beside, R_OK) != 0 || strlen(beside) >= PROGRAM_PATH_BYTES) {
+        return false;
+    }
+    memcpy(path, beside, strlen(beside) + 1);
+    return true;
+}
+
 void program_find(const char *relative, char path[PROGRAM_PATH_BYTES]) {
-    char program[PROGRAM_PATH_BYTES], beside[2 * PROGRAM_PATH_BYTES];
+    static const char *const between[] = {"", "/..", "/../share/tribend"};
+    char program[PROGRAM_PATH_BYTES];
     (void)snprintf(path, PROGRAM_PATH_BYTES, "%s", relative);
     const ssize_t count = readlink("/proc/self/exe", program, sizeof program - 1);
-    if (access(path, R_OK) != 0 && count > 0) {
-        program[count] = '\0';
-        (void)snprintf(beside, sizeof beside, "%s/../%s", dirname(program), relative);
-        if (access(beside, R_OK) == 0 && strlen(beside) < PROGRAM_PATH_BYTES) {
-            memcpy(path, beside, strlen(beside) + 1);
+    if (access(path, R_OK) == 0 || count <= 0) {
+        return;
+    }
+    program[count] = '\0';
+    const char *folder = dirname(program);
+    for (size_t i = 0; i < sizeof between / sizeof between[0]; i++) {
+        if (find_beside(folder, between[i], relative, path)) {
+            return;
         }
     }
 }
@@ -62,6 +79,10 @@ int program_run(const char *name, const struct program_subcommand *subcommands, 
     if (argc < 2 || strcmp(argv[1], "--help") == 0 || strcmp(argv[1], "help") == 0) {
         print_help(argc < 2 ? stderr : stdout, subcommands, count);
         return argc < 2 ? EXIT_USAGE : EXIT_OK;
+    }
+    if (strcmp(argv[1], "--version") == 0) {
+        printf("%s " TRIBEND_VERSION "\n", name);
+        return EXIT_OK;
     }
     for (size_t i = 0; i < count; i++) {
         if (strcmp(argv[1], subcommands[i].name) == 0) {

@@ -6,14 +6,22 @@
 #include <stdbool.h>
 #include <stddef.h>
 
+/* What an exit code means, a row each; the man page's table comes from here. */
+#define PROGRAM_EXITS(X)                                                                                                  \
+    X(OK, 0, "done")                                                                                                      \
+    X(USAGE, 2, "the command line makes no sense")                                                                        \
+    X(BAD_INPUT, 3, "a file or other input cannot be used")                                                               \
+    X(SOLVER, 4, "the solver found no solution")                                                                          \
+    X(OUTPUT, 5, "an output cannot be written")                                                                           \
+    X(FAULT, 6, "the controller latched a fault, or the chambers did not vent")                                           \
+    X(BUS, 7, "the bus or the board cannot be reached, or went away")                                                     \
+    X(MISMATCH, 8, "the board speaks another version, or has another module or table, than was asked for")                \
+    X(REFUSED, 9, "the board refused what it was told")                                                                   \
+    X(INTERRUPTED, 130, "interrupted by Ctrl-C or SIGTERM")
 enum program_exit {
-    EXIT_OK = 0,
-    EXIT_USAGE = 2,
-    EXIT_BAD_INPUT = 3,
-    EXIT_SOLVER = 4,
-    EXIT_OUTPUT = 5,
-    EXIT_FAULT = 6, /* the controller latched a fault */
-    EXIT_INTERRUPTED = 130
+#define PROGRAM_EXIT_ENUM(NAME, code, text) EXIT_##NAME = (code),
+    PROGRAM_EXITS(PROGRAM_EXIT_ENUM)
+#undef PROGRAM_EXIT_ENUM
 };
 
 #define PROGRAM_PATH_BYTES 4096
@@ -33,7 +41,8 @@ int program_fail(int code, const char *format, ...) __attribute__((format(printf
 /* Set by Ctrl-C or SIGTERM once program_catch_interrupt() was called. A second one ends the program at once. */
 extern volatile sig_atomic_t program_interrupted;
 void program_catch_interrupt(void);
-/* A file that comes with tribend: `relative` below the working directory, else below the folder above the program's. */
+/* A file that comes with tribend: `relative` below the working directory, else below the program's folder, the folder above, or
+ * share/tribend there, where it is installed. */
 void program_find(const char *relative, char path[PROGRAM_PATH_BYTES]);
 
 #endif

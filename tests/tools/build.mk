@@ -11,7 +11,7 @@ HIL_PACKAGES := user-mode-linux can-utils kmod iproute2
 # npm brings the page's plotting library. Who has npm from elsewhere keeps it: Debian's would not go beside it.
 VIEW_PACKAGES := libmicrohttpd-dev $(if $(shell command -v npm),,npm)
 # what `make test` alone needs
-TEST_PACKAGES  := chromium curl
+TEST_PACKAGES  := chromium curl mandoc man-db bsdextrautils
 LINT_PACKAGES  := clang clang-tidy cppcheck
 
 # --- sources: a folder is a layer; arrows between layers are include paths below
@@ -25,7 +25,8 @@ EMULATOR_C := $(wildcard hal/emulator/*.c)
 MODEL_C    := $(filter-out model/cli/%,$(wildcard model/*/*.c))
 SHARED_C    := $(wildcard model/units/*.c model/program/*.c) model/description/yaml_file.c model/description/calibration_file.c
 TABLES_CLI_C := $(wildcard model/cli/*.c)
-HOST_C     := $(filter-out host/cli/main.c host/board/%,$(wildcard host/*/*.c))
+HOST_C     := $(filter-out host/cli/main.c host/board/% host/manual/%,$(wildcard host/*/*.c))
+MANUAL_C   := $(wildcard host/manual/*.c)
 EMULATED_C := $(wildcard host/board/*.c)
 HOST_MAIN  := host/cli/main.c
 TEST_C     := $(wildcard tests/*/test_*.c)
@@ -39,7 +40,7 @@ BLIND_SCORE_C := $(wildcard tests/gap/blind/blind_score*.c)
 SHARE_C := $(wildcard tests/gap/share/*.c)
 BLIND_MAIN := tests/gap/blind/blind_generate.c
 BLIND_C    := $(filter-out $(BLIND_SCORE_C) $(BLIND_MAIN),$(wildcard tests/gap/blind/blind_*.c))
-ALL_C      := $(wildcard docs/examples/*.c) $(FIRMWARE_C) $(SIM_C) $(EMULATOR_C) $(MODEL_C) $(TABLES_CLI_C) $(HOST_C) $(HOST_MAIN) $(EMULATED_C) $(TEST_C) $(BENCH_C) $(SUPPORT_C) $(CAMPAIGN_C) $(CAMPAIGN_MAIN) $(FAULTS_PAGE_C) $(SOLID_C) $(BLIND_C) $(BLIND_MAIN) $(BLIND_SCORE_C) $(SHARE_C) $(BOARD_C)
+ALL_C      := $(wildcard docs/examples/*.c) $(FIRMWARE_C) $(SIM_C) $(EMULATOR_C) $(MODEL_C) $(TABLES_CLI_C) $(HOST_C) $(HOST_MAIN) $(EMULATED_C) $(MANUAL_C) $(TEST_C) $(BENCH_C) $(SUPPORT_C) $(CAMPAIGN_C) $(CAMPAIGN_MAIN) $(FAULTS_PAGE_C) $(SOLID_C) $(BLIND_C) $(BLIND_MAIN) $(BLIND_SCORE_C) $(SHARE_C) $(BOARD_C)
 ALL_H      := $(wildcard tests/gap/blind/*.h tests/model/ccx/*.h firmware/*.h firmware/*/*.h hal/*.h hal/*/*.h model/*/*.h host/*/*.h tests/*/*.h)
 
 # --- flags
@@ -126,8 +127,26 @@ $(BUILD)/tribend: $(call object,$(HOST_MAIN)) $(HOST_O) $(SIM_O) $(FIRMWARE_O) $
 $(BUILD)/tribend-board: $(EMULATED_O) $(HOST_O) $(EMULATOR_O) $(SIM_O) $(FIRMWARE_O) $(SHARED_O)
 	$(link) $(EMULATOR_LIBS)
 
+# --- man pages and completion: a generator each, of the program's own objects, sees the option tables as they are
+MANUAL_O  := $(call object,$(MANUAL_C))
+MANUAL    := $(BUILD)/manual/tribend.bash $(BUILD)/manual/tribend-tables.bash
+MANUAL_WRAP := -Wl,--wrap=argp_parse -Wl,--wrap=program_run -Wl,--wrap=execv
+# their main() under another name, for the generator to call
+$(BUILD)/manual/%_main.o: %/main.c
+	@mkdir -p $(@D)
+	$(say)$(CC) $(OPTIMISE) $(SANITIZE_FLAGS) $(MODEL_FLAGS) -Dmain=$(if $(filter host/board,$*),board_main,manual_main) -MMD -MP -c $< -o $@
+$(BUILD)/manual/tribend.generate: $(MANUAL_O) $(BUILD)/manual/host/cli_main.o $(BUILD)/manual/host/board_main.o \
+    $(filter-out %/board/main.o,$(EMULATED_O)) $(HOST_O) $(EMULATOR_O) $(SIM_O) $(FIRMWARE_O) $(SHARED_O)
+	$(link) $(MANUAL_WRAP) $(EMULATOR_LIBS)
+$(BUILD)/manual/tribend-tables.generate: $(MANUAL_O) $(BUILD)/manual/model/cli_main.o \
+    $(filter-out %/cli/main.o,$(TABLES_CLI_O)) $(MODEL_O) $(SIM_O) $(FIRMWARE_O)
+	$(link) $(MANUAL_WRAP) $(MODEL_LIBS)
+$(MANUAL): %.bash: %.generate
+	@$< $(@D)
+-include $(wildcard $(BUILD)/manual/*/*.d)
+
 .PHONY: test-programs bench-programs
-test-programs: $(TEST_PROGRAMS) $(BLIND_PROGRAMS) $(BUILD)/tests/campaign/campaign $(BUILD)/tests/docs/faults_page $(SELFTEST_ELF)
+test-programs: $(TEST_PROGRAMS) $(MANUAL) $(BLIND_PROGRAMS) $(BUILD)/tests/campaign/campaign $(BUILD)/tests/docs/faults_page $(SELFTEST_ELF)
 bench-programs: $(BENCH_PROGRAMS)
 
 # Tests of the model link its libraries; the others link what `tribend` links.
@@ -215,11 +234,11 @@ lint-clang:
 	@set -e; for f in $(HOST_SIDE_C); do clang -O1 $(COMMON_FLAGS) $(MPI_FLAGS) -Wno-unknown-pragmas -Wno-source-uses-openmp \
 	    -fopenmp -fsyntax-only $$f; done
 lint-cppcheck:
-	@cppcheck -j$(JOBS) $(CPPCHECK_FLAGS) $(FIRMWARE_C) $(BOARD_C) $(SIM_C) $(EMULATOR_C) $(MODEL_C) $(TABLES_CLI_C) $(HOST_C) $(HOST_MAIN) $(EMULATED_C)
+	@cppcheck -j$(JOBS) $(CPPCHECK_FLAGS) $(FIRMWARE_C) $(BOARD_C) $(SIM_C) $(EMULATOR_C) $(MODEL_C) $(TABLES_CLI_C) $(HOST_C) $(HOST_MAIN) $(EMULATED_C) $(MANUAL_C)
 # one file at a time: with several, clang-tidy 14 takes every va_list for uninitialised
 tidy = printf '%s\n' $(1) | xargs -P $(JOBS) -I FILE clang-tidy --quiet FILE -- $(2) 2>/dev/null
 lint-tidy:
 	@$(call tidy,$(FIRMWARE_C),$(FIRMWARE_FLAGS))
 	@$(call tidy,$(BOARD_C),$(FIRMWARE_FLAGS) $(BOARD_CLANG))
-	@$(call tidy,$(SIM_C) $(EMULATOR_C) $(MODEL_C) $(TABLES_CLI_C) $(HOST_C) $(HOST_MAIN) $(EMULATED_C),$(COMMON_FLAGS) $(MPI_FLAGS) \
+	@$(call tidy,$(SIM_C) $(EMULATOR_C) $(MODEL_C) $(TABLES_CLI_C) $(HOST_C) $(HOST_MAIN) $(EMULATED_C) $(MANUAL_C),$(COMMON_FLAGS) $(MPI_FLAGS) \
 	    -Wno-unknown-pragmas -Wno-source-uses-openmp)
