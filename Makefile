@@ -33,8 +33,8 @@ test: setup ## build and run every test (sets up what is missing first)
 	@$(MAKE) --no-print-directory -j$(JOBS) all test-programs firmware-files
 	@tests/tools/run_tests $(BUILD)
 
-bench: setup ## time equilibrium, table, simulation and diagnosis on this machine (PART=gap: one part)
-	@$(MAKE) --no-print-directory -j$(JOBS) all bench-programs
+bench: setup ## time equilibrium, table, simulation, diagnosis and emulated board on this machine (PART=gap: one part)
+	@$(MAKE) --no-print-directory -j$(JOBS) all bench-programs firmware-files
 	@tests/tools/bench $(BUILD)
 
 gap-check: setup ## blind check of the diagnosis: data of another plant, truth withheld (FULL=1: four times as many; MPI_RANKS=n)

@@ -10,6 +10,7 @@
 #define ERROR_FRAME_BITS 17 /* flag of 6, its echo of up to 3 more, delimiter of 8 */
 #define TAIL_BITS 10        /* CRC delimiter, acknowledge slot and its delimiter, 7 of the frame's end */
 #define PASSIVE_AT 128u
+#define OFF_AFTER_DOMINANT_BITS (14 + 31 * 8)
 #define OFF_AT 256u
 #define BACK_FROM_PASSIVE 119u
 #define ERROR_STUFF 1
@@ -146,6 +147,17 @@ static void fail_sender(struct can_bus *bus, struct can_bus_node *node, uint8_t 
     tell(node, error);
 }
 
+/* After an error flag each further eight dominant bits count as an error: 31 times, and a sender is off the
+ * bus. */
+static void fail_for_good(struct can_bus_node *node) {
+    node->transmit_errors = OFF_AT;
+    node->error_frames++;
+    node->bus_off = true;
+    node->online = false;
+    node->recovery = 0u;
+    tell(node, ERROR_FORM);
+}
+
 static void fail_receiver(struct can_bus_node *node, uint32_t by, uint8_t error) {
     node->receive_errors = node->receive_errors + by > 135u ? 135u : node->receive_errors + by;
     node->error_frames++;
@@ -185,11 +197,12 @@ static uint64_t rank(const struct can_bus_frame *frame) {
 
 static bool choose(struct can_bus *bus) {
     bus->sender = NULL;
-    for (size_t i = 0; i < bus->nodes; i++) {
+    for (size_t i = 0; i < bus->nodes && bus->wire != CAN_BUS_DOMINANT; i++) {
         struct can_bus_node *node = bus->node[i];
         struct can_bus_frame frame;
-        if (!node->online || node->listens_only || node->recovery > 0u ||
-            node->not_before_ticks > *bus->now_ticks || !node->wants(node->context, &frame)) {
+        if ((bus->wire == CAN_BUS_OPEN && i > 0) || !node->online || node->listens_only ||
+            node->recovery > 0u || node->not_before_ticks > *bus->now_ticks ||
+            !node->wants(node->context, &frame)) {
             continue;
         }
         if (bus->sender == NULL || rank(&frame) < rank(&bus->frame)) {
@@ -214,9 +227,9 @@ static void start(struct can_bus *bus) {
     const struct can_bus_node *sender = bus->sender;
     const int64_t length = can_bus_frame_ticks(&bus->frame, sender->bit_ticks, sender->data_bit_ticks);
     bus->started_ticks = *bus->now_ticks;
-    /* On a shorted wire the very first recessive bit of the identifier reads dominant. */
+    /* On shorted wires the very first dominant bit reads recessive. */
     schedule_set(bus->schedule, bus->slot,
-                 *bus->now_ticks + (bus->wire == CAN_BUS_SHORTED ? 2 * sender->bit_ticks : length));
+                 *bus->now_ticks + (bus->wire == CAN_BUS_SHORTED ? sender->bit_ticks : length));
 }
 
 /* When a node that has to wait may go on. */
@@ -225,7 +238,7 @@ static int64_t next_wait(const struct can_bus *bus) {
     for (size_t i = 0; i < bus->nodes; i++) {
         const struct can_bus_node *node = bus->node[i];
         int64_t at = SCHEDULE_NEVER;
-        if (node->recovery > 0u && bus->wire != CAN_BUS_SHORTED) {
+        if (node->recovery > 0u && bus->wire != CAN_BUS_DOMINANT) {
             at = bus->idle_ticks + RECESSIVE_RUN_BITS * node->bit_ticks;
         } else if (node->online && node->not_before_ticks > *bus->now_ticks) {
             at = node->not_before_ticks;
@@ -250,7 +263,7 @@ void can_bus_attend(struct can_bus *bus) {
 
 /* Eleven recessive bits have gone by, at the end of a frame or in an idle bus. */
 static void recessive_run(struct can_bus *bus) {
-    for (size_t i = 0; i < bus->nodes && bus->wire != CAN_BUS_SHORTED; i++) {
+    for (size_t i = 0; i < bus->nodes && bus->wire != CAN_BUS_DOMINANT; i++) {
         struct can_bus_node *node = bus->node[i];
         if (node->recovery > 0u && --node->recovery == 0u) {
             const bool was_off = node->bus_off;
@@ -283,7 +296,11 @@ static void fail(struct can_bus *bus, struct can_bus_node *sender, uint8_t error
     bus->errors++;
     for (size_t i = 0; i < bus->nodes; i++) {
         struct can_bus_node *node = bus->node[i];
-        if (node != sender && node->online && hears(bus, sender, node) && error != ERROR_ACK) {
+        struct can_bus_frame frame;
+        if (node != sender && node->online && bus->wire == CAN_BUS_SHORTED &&
+            node->wants(node->context, &frame)) {
+            fail_sender(bus, node, error); /* it has tried at the same time, and seen nobody */
+        } else if (node != sender && node->online && hears(bus, sender, node) && error != ERROR_ACK) {
             fail_receiver(node, 1u, error == ERROR_BIT_0 ? ERROR_STUFF : ERROR_CRC);
         }
     }
@@ -332,6 +349,17 @@ static void deliver(struct can_bus *bus, struct can_bus_node *sender) {
     sender->sent(sender->context);
 }
 
+static void fail_dominant(struct can_bus *bus, struct can_bus_node *sender) {
+    bus->sender = NULL;
+    bus->errors++;
+    fail_for_good(sender);
+    for (size_t i = 0; i < bus->nodes; i++) {
+        if (bus->node[i] != sender && bus->node[i]->online) {
+            fail_receiver(bus->node[i], PASSIVE_AT, ERROR_STUFF);
+        }
+    }
+}
+
 static void on_end(void *context, int64_t at_ticks) {
     struct can_bus *bus = context;
     struct can_bus_node *sender = bus->sender;
@@ -339,6 +367,10 @@ static void on_end(void *context, int64_t at_ticks) {
         bus->sender = NULL;
         bus->idle_ticks = at_ticks + INTERMISSION_BITS * sender->bit_ticks;
         can_bus_attend(bus);
+        return;
+    }
+    if (bus->wire == CAN_BUS_DOMINANT) {
+        fail_dominant(bus, sender);
         return;
     }
     const uint8_t error = judge(bus, sender);
@@ -373,6 +405,12 @@ bool can_bus_join(struct can_bus *bus, struct can_bus_node *node) {
 
 void can_bus_set_wire(struct can_bus *bus, enum can_bus_wire wire) {
     bus->wire = wire;
+    if (bus->sender != NULL && wire == CAN_BUS_SHORTED) {
+        schedule_set(bus->schedule, bus->slot, *bus->now_ticks + bus->sender->bit_ticks);
+    } else if (bus->sender != NULL && wire == CAN_BUS_DOMINANT) {
+        schedule_set(bus->schedule, bus->slot,
+                     *bus->now_ticks + OFF_AFTER_DOMINANT_BITS * bus->sender->bit_ticks);
+    }
     bus->idle_ticks = bus->sender == NULL ? *bus->now_ticks : bus->idle_ticks;
     can_bus_attend(bus);
 }

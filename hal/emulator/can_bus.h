@@ -40,9 +40,11 @@ struct can_bus_node {
 
 enum can_bus_wire {
     CAN_BUS_SOUND,
-    CAN_BUS_SHORTED,
-    CAN_BUS_OPEN
-}; /* open: the board's own node is cut off from the others */
+    CAN_BUS_SHORTED,  /* the two wires to each other: every bit reads recessive, each node is alone with its
+                         errors */
+    CAN_BUS_DOMINANT, /* a wire to the supply: every bit reads dominant, nobody sees the bus idle */
+    CAN_BUS_OPEN      /* the board is cut off from the others, which wait */
+};
 
 struct can_bus {
     struct schedule *schedule;

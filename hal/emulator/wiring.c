@@ -111,19 +111,38 @@ bool wiring_fills(const struct wiring *wiring) {
 
 /* --- inputs --- */
 
+/* What a chamber's sensor stands at, before its own noise. */
+static double spoil_pressure(struct wiring *wiring, uint32_t c) {
+    const struct wiring_faults *faults = &wiring->faults;
+    const uint32_t from = faults->readings_exchanged && c < 2u ? 1u - c : c;
+    wiring->drifted_pa[c] += faults->reading_drift_paps[c] * 1e-6 * STEP_US; /* one sequence a control step */
+    double pressure_pa =
+        wiring->plant.reading_pa[from] * (1.0 + faults->reading_gain[c]) + wiring->drifted_pa[c];
+    if (faults->noise_added_pa[c] > 0.0) {
+        pressure_pa += faults->noise_added_pa[c] * random_normal(&wiring->fault_random);
+    }
+    return pressure_pa;
+}
+
 static void draw(struct wiring *wiring, uint32_t index) {
-    const double truth = index < 3u ? wiring->plant.reading_pa[index] : wiring->plant.influence.supply_pa;
-    wiring->noisy_pa[index] =
-        truth + wiring->parameters.sensor.pressure_noise_pa * random_normal(&wiring->pressure_random[index]);
+    const struct wiring_faults *faults = &wiring->faults;
+    const double stands_pa =
+        index == SUPPLY_INDEX ? wiring->plant.influence.supply_pa : spoil_pressure(wiring, index);
+    const double noisy_pa = stands_pa + wiring->parameters.sensor.pressure_noise_pa *
+                                            random_normal(&wiring->pressure_random[index]);
+    if (index == SUPPLY_INDEX || !faults->reading_stands[index]) {
+        wiring->shown_pa[index] = noisy_pa;
+    }
+    if (index != SUPPLY_INDEX && faults->reading_replaced[index]) {
+        wiring->shown_pa[index] = (double)faults->reading_pa[index];
+    }
 }
 
 static double ratio_of(const struct wiring *wiring, uint32_t index) {
     const double full_pa = index == SUPPLY_INDEX ? SUPPLY_FULL_PA : CHAMBER_FULL_PA;
     const bool broken =
         index == SUPPLY_INDEX ? wiring->faults.supply_unknown : wiring->faults.channel_fails[index];
-    const bool replaced = index < 3u && wiring->faults.reading_replaced[index];
-    const double pressure_pa = replaced ? (double)wiring->faults.reading_pa[index] : wiring->noisy_pa[index];
-    return broken ? 0.0 : RATIO_AT_ZERO + RATIO_SPAN * pressure_pa / full_pa;
+    return broken ? 0.0 : RATIO_AT_ZERO + RATIO_SPAN * wiring->shown_pa[index] / full_pa;
 }
 
 double wiring_sample(void *context, uint32_t channel) {
@@ -170,11 +189,48 @@ static void send_record(struct wiring *wiring, const struct hal_tip_sample *tip)
     const int64_t start_ticks =
         (tip->measured_us + wiring->parameters.sensor.tip_delay_us) * TICKS_PER_US - byte_ticks;
     size_t count = wiring->encode(tip, bytes);
+    if (wiring->line_free_ticks > start_ticks + (int64_t)count * byte_ticks) {
+        wiring->tip_dropped++; /* a record is still waiting behind the one on the line */
+        return;
+    }
     count = wiring->tamper != NULL ? wiring->tamper(wiring->tamper_context, bytes, count) : count;
     if (start_ticks > wiring->line_free_ticks) {
         wiring->line_free_ticks = start_ticks;
     }
     wiring_send_bytes(wiring, bytes, count);
+}
+
+static float scatter(struct wiring *wiring, double most) {
+    return (float)(most * (2.0 * random_uniform(&wiring->fault_random) - 1.0));
+}
+
+static void scatter_pose(struct wiring *wiring, struct hal_tip_sample *sample) {
+    double norm = 0.0;
+    for (size_t i = 0; i < 4; i++) {
+        sample->quaternion[i] = scatter(wiring, 1.0);
+        norm += (double)sample->quaternion[i] * (double)sample->quaternion[i];
+    }
+    for (size_t i = 0; i < 4; i++) {
+        sample->quaternion[i] = (float)((double)sample->quaternion[i] / sqrt(norm));
+    }
+    for (size_t i = 0; i < 3; i++) {
+        sample->position_m[i] = scatter(wiring, 0.1);
+    }
+}
+
+static void spoil_tip(struct wiring *wiring, struct hal_tip_sample *sample) {
+    const struct wiring_faults *faults = &wiring->faults;
+    if (faults->tip_stands) {
+        const int64_t measured_us = sample->measured_us;
+        *sample = wiring->tip_shown;
+        sample->measured_us = measured_us;
+    }
+    if (faults->tip_scatters) {
+        scatter_pose(wiring, sample);
+    }
+    sample->position_m[0] += (float)faults->tip_away_m;
+    sample->status |= faults->tip_status;
+    wiring->tip_shown = *sample;
 }
 
 /* Samples are taken now and sent later; those under way are in the line's queue. */
@@ -190,6 +246,7 @@ static void on_tip(void *context, int64_t at_ticks) {
     sensor_tip(sensor, &wiring->plant.pose, at_us, &wiring->tip_random, &tip);
     wiring->tip_samples++;
     if (!wiring->faults.tip_stops && wiring->encode != NULL) {
+        spoil_tip(wiring, &tip);
         send_record(wiring, &tip);
     }
 }
@@ -212,6 +269,7 @@ void wiring_init(struct wiring *wiring, const struct bend_table *table,
     random_seed(&wiring->tip_random, seed, 4);
     random_seed(&wiring->chance_random, seed, 5);
     random_seed(&wiring->converter_random, seed, 6);
+    random_seed(&wiring->fault_random, seed, 8);
     wiring->supply_shut_us = wiring->coils_off_us = -1;
     wiring->valves->updated = on_period;
     wiring->valves->outputs_changed = on_outputs;

@@ -13,15 +13,25 @@
 
 #define WIRING_RECORD_BYTES 64u
 
-/* Faults that a test or a drill injects, by the names that the simulated HAL has. */
+/* Faults that a test or a drill injects, by the names that the simulated HAL has; those of valves and gas are
+ * in the plant. */
 struct wiring_faults {
     bool pressure_bus_fails;  /* the converter never finishes */
     bool channel_fails[3];    /* the sensor's wire is broken */
     bool reading_replaced[3]; /* a sensor shows this pressure instead */
     float reading_pa[3];
-    bool supply_unknown; /* the supply sensor's wire is broken */
-    bool tip_stops;      /* no more bytes from the tip sensor */
-    bool outputs_fail;   /* a break of TIM1 that does not go away */
+    bool reading_stands[3];       /* a sensor goes on showing its last value */
+    double reading_drift_paps[3]; /* a sensor drifts away from now on */
+    double reading_gain[3];       /* it shows so much more of the pressure: 0 is sound, -1 shows nothing */
+    double noise_added_pa[3];     /* rms of noise on top of the sensor's own */
+    bool readings_exchanged;      /* the wires of sensors 1 and 2 */
+    bool supply_unknown;          /* the supply sensor's wire is broken */
+    bool tip_stops;               /* no more bytes from the tip sensor */
+    bool tip_stands;              /* samples arrive, all with the same pose */
+    bool tip_scatters;            /* samples with poses from nowhere */
+    uint16_t tip_status;          /* bits that the tip sensor sets */
+    double tip_away_m;            /* it shows positions so far off */
+    bool outputs_fail;            /* a break of TIM1 that does not go away */
 };
 
 /* What the tip sensor sends of a sample; returns the number of bytes. */
@@ -46,7 +56,10 @@ struct wiring {
     struct plant plant;
     int64_t plant_us;
     struct random_stream pressure_random[4], converter_random, tip_random, chance_random;
-    double noisy_pa[4]; /* of the sequence under way */
+    double shown_pa[4]; /* by each sensor, in the sequence under way */
+    double drifted_pa[3];
+    struct hal_tip_sample tip_shown; /* the last one */
+    struct random_stream fault_random;
     wiring_encode encode;
     wiring_tamper tamper;
     void *tamper_context;
@@ -54,6 +67,7 @@ struct wiring {
     int64_t line_free_ticks; /* of the tip sensor's transmitter */
     size_t tip_slot, step_slot;
     uint32_t tip_samples;
+    uint32_t tip_dropped;                 /* by the sensor, whose line was busy */
     int64_t supply_shut_us, coils_off_us; /* when it last happened; -1: never */
 };
 

@@ -169,7 +169,7 @@ $(BUILD)/tests/campaign/test_campaign: $(call object,$(CAMPAIGN_C))
 $(BUILD)/tests/campaign/campaign: $(call object,$(CAMPAIGN_MAIN) $(CAMPAIGN_C)) $(HOST_O) $(SIM_O) $(FIRMWARE_O) $(SHARED_O)
 	$(link) $(HOST_LIBS)
 $(BUILD)/tests/gap/test_blind_plant: $(call object,$(filter-out %/blind_truth.c,$(BLIND_C)))
-$(BUILD)/tests/board/test_conversions $(BUILD)/tests/board/test_port: $(call object,$(PORT_PURE_C))
+$(BUILD)/tests/board/test_conversions $(BUILD)/tests/board/test_port $(BUILD)/tests/hil/test_replay: $(call object,$(PORT_PURE_C))
 $(BUILD)/tests/%: $(BUILD)/tests/%.o $(SUPPORT_O) $(HOST_O) $(EMULATOR_O) $(SIM_O) $(FIRMWARE_O) $(SHARED_O)
 	$(link) -lcmocka $(EMULATOR_LIBS)
 
