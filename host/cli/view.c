@@ -107,7 +107,7 @@ struct session {
 static bool session_receive(void *context, struct link_report *report) {
     struct session *session = context;
     struct bus *bus = &session->bus;
-    sim_drill_apply(&session->arguments->bus.drill, &bus->sim, bus->controller_image, bus->file.size);
+    bus_drill(bus, &session->arguments->bus);
     if (!bus->link.receive(bus->link.context, report)) {
         return false;
     }
@@ -223,7 +223,7 @@ static int record(struct session *session) {
     (void)snprintf(note, sizeof note, "live view, bus %.40s", bus_options->bus);
     const struct run_log_metadata metadata = {.module = module->name,
                                               .table_hash = module->inputs_hash,
-                                              .rate_hz = 1e6 / (double)CONTROLLER_STEP_US,
+                                              .rate_hz = session->bus.rate_hz,
                                               .note = note};
     if (!run_log_create(&session->log, bus_options->record, &metadata, error, sizeof error)) {
         return program_fail(EXIT_OUTPUT, "%s", error);
@@ -260,6 +260,7 @@ int cli_view(int argc, char **argv) {
     static struct session session;
     struct arguments arguments = {.listen = "127.0.0.1", .port = PORT, .lease_s = LEASE_S};
     bus_options_init(&arguments.bus);
+    arguments.bus.needs_table = true;
     arguments.bus.duration_s = 0.0; /* until Ctrl-C */
     argp_err_exit_status = EXIT_USAGE;
     if (argp_parse(&parser, argc, argv, 0, NULL, &arguments) != 0) {

@@ -38,9 +38,12 @@ CAMPAIGN_C := $(filter-out $(TEST_C) $(CAMPAIGN_MAIN),$(wildcard tests/campaign/
 SOLID_C    := $(wildcard tests/model/ccx/*.c)
 BLIND_SCORE_C := $(wildcard tests/gap/blind/blind_score*.c)
 SHARE_C := $(wildcard tests/gap/share/*.c)
+# boards for tests of the host: the firmware's node on the simulated HAL
+STUB_C := $(wildcard tests/link/stub/*.c)
+STUB := $(BUILD)/tests/link/stub/board_stub
 BLIND_MAIN := tests/gap/blind/blind_generate.c
 BLIND_C    := $(filter-out $(BLIND_SCORE_C) $(BLIND_MAIN),$(wildcard tests/gap/blind/blind_*.c))
-ALL_C      := $(wildcard docs/examples/*.c) $(FIRMWARE_C) $(SIM_C) $(EMULATOR_C) $(MODEL_C) $(TABLES_CLI_C) $(HOST_C) $(HOST_MAIN) $(EMULATED_C) $(MANUAL_C) $(TEST_C) $(BENCH_C) $(SUPPORT_C) $(CAMPAIGN_C) $(CAMPAIGN_MAIN) $(FAULTS_PAGE_C) $(SOLID_C) $(BLIND_C) $(BLIND_MAIN) $(BLIND_SCORE_C) $(SHARE_C) $(BOARD_C)
+ALL_C      := $(wildcard docs/examples/*.c) $(FIRMWARE_C) $(SIM_C) $(EMULATOR_C) $(MODEL_C) $(TABLES_CLI_C) $(HOST_C) $(HOST_MAIN) $(EMULATED_C) $(MANUAL_C) $(TEST_C) $(BENCH_C) $(SUPPORT_C) $(CAMPAIGN_C) $(CAMPAIGN_MAIN) $(FAULTS_PAGE_C) $(SOLID_C) $(BLIND_C) $(BLIND_MAIN) $(BLIND_SCORE_C) $(SHARE_C) $(STUB_C) $(BOARD_C)
 ALL_H      := $(wildcard tests/gap/blind/*.h tests/model/ccx/*.h firmware/*.h firmware/*/*.h hal/*.h hal/*/*.h model/*/*.h host/*/*.h tests/*/*.h)
 
 # --- flags
@@ -146,7 +149,7 @@ $(MANUAL): %.bash: %.generate
 -include $(wildcard $(BUILD)/manual/*/*.d)
 
 .PHONY: test-programs bench-programs
-test-programs: $(TEST_PROGRAMS) $(MANUAL) $(BLIND_PROGRAMS) $(BUILD)/tests/campaign/campaign $(BUILD)/tests/docs/faults_page $(SELFTEST_ELF)
+test-programs: $(TEST_PROGRAMS) $(MANUAL) $(BLIND_PROGRAMS) $(BUILD)/tests/campaign/campaign $(BUILD)/tests/docs/faults_page $(STUB) $(SELFTEST_ELF)
 bench-programs: $(BENCH_PROGRAMS)
 
 # Tests of the model link its libraries; the others link what `tribend` links.
@@ -163,6 +166,8 @@ $(BUILD)/tests/gap/blind/blind_score: $(call object,$(BLIND_SCORE_C))
 # Steps over cores and ranks: the tables' own sweep, which needs MPI.
 $(BUILD)/tests/gap/share/gap_share: $(call object,$(SHARE_C) $(wildcard model/sweep/*.c))
 	$(link) $(shell pkg-config --libs mpi-c 2>/dev/null) -lz -fopenmp
+$(STUB): $(call object,$(STUB_C) tests/support/sim_storage.c) $(HOST_O) $(SIM_O) $(FIRMWARE_O) $(SHARED_O)
+	$(link) $(HOST_LIBS)
 $(BUILD)/tests/docs/faults_page: $(call object,$(FAULTS_PAGE_C)) $(FIRMWARE_O)
 	$(link) -lm
 $(BUILD)/tests/campaign/test_campaign: $(call object,$(CAMPAIGN_C))
