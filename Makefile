@@ -15,7 +15,7 @@ SHELL    := /bin/bash
 MAKEFLAGS += --no-builtin-rules
 include tests/tools/build.mk
 
-.PHONY: help setup all demo test bench gap-check firmware flash misra hil campaign docs-faults lint format tables install uninstall clean
+.PHONY: help setup all demo test bench gap-check firmware flash misra hil campaign docs docs-faults lint format tables install uninstall clean
 
 help: ## list these targets
 	@grep -hE '^[a-z-]+:.*## ' Makefile | awk -F ':.*## ' '{printf "  make %-10s %s\n", $$1, $$2}'
@@ -62,6 +62,10 @@ campaign: setup ## break the simulated board in every way, alone and in pairs (M
 	@$(MAKE) --no-print-directory -j$(JOBS) $(BUILD)/tests/campaign/campaign
 	@$(BUILD)/tests/campaign/campaign $(if $(MISSIONS),-n $(MISSIONS)) $(if $(SEED),-s $(SEED)) $(if $(FAULT),-f '$(FAULT)') \
 	    -o $(if $(CSV),$(CSV),$(BUILD)/campaign.csv)
+
+docs: all ## check the documentation: links, subcommands, headers, drawings, the commands of its pages
+	@tests/tools/setup $(TEST_PACKAGES)
+	@TRIBEND_BUILD=$(BUILD) bash tests/docs/test_docs.sh
 
 docs-faults: $(BUILD)/tests/docs/faults_page ## write docs/faults.md from firmware/safety/faults.def
 	@$(BUILD)/tests/docs/faults_page >docs/faults.md
