@@ -160,16 +160,18 @@ static void wait_for_the_end(const struct session *session) {
     }
 }
 
-static int summarise(const struct session *session) {
+static int summarise(struct session *session) {
     const struct view_pump *pump = &session->pump;
     printf("requests  %" PRIu64 " refused; events that could not be made: %" PRIu64
-           "; fell behind the clock %u times\n",
-           session->server.refused, session->hub.events_unmade, pump->slipped);
+           "; fell behind the clock %u times, lost the "
+           "board %u times\n",
+           session->server.refused, session->hub.events_unmade, pump->slipped, pump->lost);
     if (pump->gone) {
-        return program_fail(EXIT_OUTPUT, "the controller on bus %s went away", session->arguments->bus.bus);
+        return bus_gone(&session->bus, &session->arguments->bus);
     }
     if (!pump->vented) {
-        return program_fail(EXIT_FAULT, "the chambers did not vent");
+        return pump->lost > 0 ? bus_gone(&session->bus, &session->arguments->bus)
+                              : program_fail(EXIT_FAULT, "the chambers did not vent");
     }
     printf("vented\n");
     return program_interrupted != 0 && session->arguments->bus.duration_s > 0.0 ? EXIT_INTERRUPTED : EXIT_OK;
@@ -180,7 +182,8 @@ static int pump(struct session *session) {
     const char *bus = session->arguments->bus.bus;
     session->pump.hub = &session->hub;
     session->pump.link = (struct link){.context = session, .send = session_send, .receive = session_receive};
-    session->pump.paced = strcmp(bus, "sim") == 0;
+    session->pump.comes_back = session->bus.can != NULL;
+    session->pump.paced = session->bus.can == NULL;
     session->pump.wake = view_server_wake;
     session->pump.wake_context = &session->server;
     program_catch_interrupt();

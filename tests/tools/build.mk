@@ -2,6 +2,8 @@
 
 JOBS := $(shell nproc 2>/dev/null || echo 1)
 
+VERSION := $(shell sed -n 's/.*define TRIBEND_VERSION "\(.*\)"/\1/p' model/program/version.h)
+
 BUILD_PACKAGES := gcc libc6-dev pkg-config libgmsh-dev libsuitesparse-dev libgsl-dev libcyaml-dev libyaml-dev \
                   libopenmpi-dev openmpi-bin zlib1g-dev libjansson-dev libcmocka-dev calculix-ccx gnuplot-nox fonts-dejavu-core \
                   $(FIRMWARE_PACKAGES) $(EMULATOR_PACKAGES) $(HIL_PACKAGES) $(VIEW_PACKAGES)
@@ -11,7 +13,7 @@ HIL_PACKAGES := user-mode-linux can-utils kmod iproute2
 # npm brings the page's plotting library. Who has npm from elsewhere keeps it: Debian's would not go beside it.
 VIEW_PACKAGES := libmicrohttpd-dev $(if $(shell command -v npm),,npm)
 # what `make test` alone needs
-TEST_PACKAGES  := chromium curl mandoc man-db bsdextrautils
+TEST_PACKAGES  := chromium curl mandoc man-db bsdextrautils systemd librsvg2-bin
 LINT_PACKAGES  := clang clang-tidy cppcheck
 
 # --- sources: a folder is a layer; arrows between layers are include paths below
