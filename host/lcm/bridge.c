@@ -256,6 +256,8 @@ static void send_waiting(struct bridge *bridge, const struct bridge_now *now) {
         bridge->counters.commands_forwarded++;
         bridge->followed = bridge->waiting;
         bridge->followed_us = now->monotonic_us;
+    } else {
+        bridge->counters.commands_unsent++;
     }
     bridge->waiting.kind = COMMAND_NONE;
 }
@@ -316,6 +318,7 @@ void bridge_step(struct bridge *bridge, const struct bridge_now *now) {
 }
 
 void bridge_lose_bus(struct bridge *bridge, const struct bridge_now *now) {
+    bridge->counters.commands_unsent += bridge->waiting.kind != COMMAND_NONE ? 1 : 0;
     bridge->waiting.kind = COMMAND_NONE;
     command_gate_shut(&bridge->gate, now->monotonic_us);
 }

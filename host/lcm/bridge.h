@@ -61,6 +61,7 @@ enum bridge_channel {
     X(commands_flying, "of them, refused: already under way when the bridge started or the board came back") \
     X(commands_superseded, "of them, left for a fresher one that came with them")                            \
     X(commands_late, "of them, not fresher than one before")                                                 \
+    X(commands_unsent, "of them, for which the bus had no room")                                             \
     X(commands_malformed, "of them, of another type, unknown or out of range")                               \
     X(requests_received, "requests for parameters that came over LCM")                                       \
     X(requests_dropped, "of them, unknown, or more than wait at once")                                       \
@@ -99,30 +100,29 @@ struct bridge_request {
 };
 
 struct bridge {
-    uint32_t node;
     struct bridge_out out;
     struct bridge_counters counters;
     struct can_assembly assembly;
     struct clock_map clock;
     struct command_gate gate;
     struct latency latency;
-    bool board_is_heard;
-    int64_t heard_us;                   /* monotonic */
-    int64_t call_us;                    /* monotonic, when a silent board is called next */
-    uint32_t protocol;                  /* that the board speaks; 0: not heard */
-    int64_t utime_us;                   /* of the last status published */
-    bool report_is_new;                 /* for logs; cleared by whoever took it */
-    struct controller_command waiting;  /* COMMAND_NONE: none */
-    struct controller_command followed; /* that was last sent */
-    int64_t followed_us;                /* monotonic, when */
-    uint8_t sequence;
-    uint64_t refusals_seen;
-    struct bridge_request
-        request[BRIDGE_REQUESTS_MOST]; /* a ring; the first is under way when asked_us is set */
-    size_t first_request, requests;
+    int64_t heard_us;    /* monotonic, like all but utime_us */
+    int64_t call_us;     /* when a silent board is called next */
+    int64_t status_us;   /* when TRIBEND_BRIDGE is due */
+    int64_t followed_us; /* when the last command was sent */
     int64_t asked_us;
+    int64_t utime_us; /* of the last status published */
+    uint64_t refusals_seen;
+    size_t first_request, requests;
+    struct bridge_request request[BRIDGE_REQUESTS_MOST]; /* a ring; the first is under way while `asked` */
+    struct controller_command waiting;                   /* COMMAND_NONE: none */
+    struct controller_command followed;                  /* that was last sent */
+    uint32_t node;
+    uint32_t protocol; /* that the board speaks; 0: not heard */
+    uint8_t sequence;
+    bool board_is_heard;
     bool asked;
-    int64_t status_us; /* monotonic, when TRIBEND_BRIDGE is due */
+    bool report_is_new; /* for logs; cleared by whoever took it */
 };
 
 void bridge_init(struct bridge *bridge, uint32_t node, const struct bridge_out *out,

@@ -144,7 +144,7 @@ bool bridge_decode_parameter(const void *data, uint32_t bytes, int *request, uin
     if (tribend_parameter_t_decode(data, 0, (int)bytes, &message) != (int)bytes) {
         return false;
     }
-    *request = message.request;
+    *request = message.request < 0 ? -1 : message.request;
     *parameter = (uint32_t)message.parameter;
     *value = (uint32_t)message.value;
     return true;

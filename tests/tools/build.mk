@@ -58,8 +58,8 @@ SANITIZE_FLAGS := $(if $(filter 1,$(SANITIZE)),-fsanitize=address -fsanitize=und
 # No fused multiply-add and no reassociation anywhere: the same inputs give the same bits on every build.
 EXACT := -ffp-contract=off
 INCLUDES := -Ifirmware -Ihal -Imodel -Ihost -Itests
-# lcm-gen's C is not held to our warnings
-LCM_INCLUDES := -isystem $(BUILD)/lcm
+# what lcm-gen makes of host/lcm
+LCM_INCLUDES := -I$(BUILD)/lcm
 FIRMWARE_FLAGS := -std=c11 $(WARNINGS) -Wdouble-promotion $(EXACT) -fno-math-errno -Ifirmware -Ihal
 COMMON_FLAGS   := -std=gnu11 -D_GNU_SOURCE $(WARNINGS) $(EXACT) $(INCLUDES) $(LCM_INCLUDES)
 MPI_FLAGS      := $(patsubst -I%,-isystem %,$(shell pkg-config --cflags-only-I mpi-c 2>/dev/null))

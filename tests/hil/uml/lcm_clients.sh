@@ -105,7 +105,7 @@ read -r open refused forwarded <<<"$listened"
 check flying_command_is_refused $?
 kill -9 "$flying"
 wait "$flying" 2>/dev/null
-sleep 1.2
+sleep 3 # a second, and what the bridge still had to hear
 "$mission" fly 100 &
 flying=$!
 within 20 told_bend 60 1.5
