@@ -85,11 +85,12 @@ static int fly_steps(lcm_t *lcm, int64_t limit_us) {
 }
 
 static int fly(lcm_t *lcm, int64_t duration_us) {
+    const struct timespec wait = {.tv_nsec = PERIOD_US * 1000};
     const int64_t end_us = now_us() + duration_us;
     bool sent = true;
     while (sent && now_us() < end_us) {
         sent = command(lcm, BEND, FIRST_URAD);
-        hear(lcm, PERIOD_US);
+        (void)nanosleep(&wait, NULL);
     }
     return sent ? 0 : 1;
 }
