@@ -17,7 +17,7 @@
 #include "link/transport.h"
 
 #define BRIDGE_REQUESTS_MOST 32u
-#define BRIDGE_SILENT_US 500000
+#define BRIDGE_SILENT_US 2000000 /* more than a busy host holds it up */
 #define BRIDGE_ANSWER_US 500000
 #define BRIDGE_STATUS_US 1000000
 #define BRIDGE_CALL_US 500000  /* a silent board is asked who it is so often */

@@ -162,7 +162,7 @@ static void a_board_that_was_away_shuts_the_gate(void **state) {
     sender_says(COMMAND_BEND, 2);
     pass(0);
     assert_int_equal(world.bridge.counters.commands_forwarded, 1);
-    for (int i = 0; i < 12; i++) {
+    for (int i = 0; i < 45; i++) {
         pass(50000);
         sender_says(COMMAND_BEND, 3 + i);
     }

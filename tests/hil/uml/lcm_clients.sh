@@ -23,7 +23,7 @@ bridge_end() { # SIGNAL
     kill "-$1" "$bridge" 2>/dev/null
     wait "$bridge" 2>/dev/null
 }
-said() { grep -q "$2" "$SCRATCH/$1.out"; } # NAME PATTERN
+said() { grep -qs "$2" "$SCRATCH/$1.out"; } # NAME PATTERN
 counter() { awk -v name="$2" '$1 == name { print $2 }' "$SCRATCH/$1.out"; } # NAME COUNTER
 
 candump_start both
