@@ -26,6 +26,7 @@ int cli_effects(int argc, char **argv);
 int cli_run(int argc, char **argv);
 int cli_board(int argc, char **argv);
 int cli_view(int argc, char **argv);
+int cli_bridge(int argc, char **argv);
 /* `tribend gap plan` */
 int gap_plan_run(int argc, char **argv);
 /* `tribend gap close` */

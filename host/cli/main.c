@@ -15,6 +15,7 @@ static const struct program_subcommand subcommands[] = {
     {"effects", cli_effects, "list what the simulated module can be given, and what each leaves in a recording"},
     {"board", cli_board, "run the flashed firmware on an emulated board with the simulated module"},
     {"view", cli_view, "serve the live view, a page for a browser"},
+    {"bridge", cli_bridge, "carry a board's telemetry to LCM, and commands from LCM to the board"},
     {"gap", cli_gap, "say why the module differs from its model"}};
 
 int main(int argc, char **argv) {
