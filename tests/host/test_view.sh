@@ -68,6 +68,18 @@ done
 refuses ninth_page 503 'too many pages' "${address}events?page=9&token=$token"
 # shellcheck disable=SC2086
 kill $streams 2>/dev/null
+# a page whose stream ends loses the arm at once, not when its lease runs out
+curl -sN -m 30 "${address}events?page=watcher&token=$token" >"$scratch/watched" 2>/dev/null &
+watcher=$!
+curl -sN -m 30 "${address}events?page=closer&token=$token" >"$scratch/closer" 2>/dev/null &
+closer=$!
+for _ in $(seq 200); do [ -s "$scratch/closer" ] && break || sleep 0.05; done
+curl -s -H "Authorization: Bearer $token" -d '{"page":"closer"}' "${address}arm" >/dev/null
+kill $closer
+for _ in $(seq 200); do tail -n 3 "$scratch/watched" | grep -q 'was closed\|fell silent' && break || sleep 0.05; done
+tail -n 3 "$scratch/watched" | grep -q 'was closed'
+check closed_stream_takes_the_arm_away $?
+kill $watcher
 cp tests/host/view/package.json tests/host/view/package-lock.json "$scratch/"
 tests/tools/npm_packages "$scratch"
 while read -r verdict name; do
