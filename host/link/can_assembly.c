@@ -127,7 +127,7 @@ static bool finish(struct can_assembly *assembly, uint64_t now_us) {
         return false;
     }
     if (assembly->reported) {
-        const uint64_t periods = (now_us - assembly->reported_us + period_us / 2) / period_us;
+        const uint64_t periods = (now_us - assembly->reported_us + CONTROLLER_STEP_US) / period_us;
         assembly->missing += periods > 1 ? periods - 1 : 0;
     }
     assembly->reported = true;
