@@ -7,7 +7,7 @@
 
 #define ANSWER_US 150000
 #define SAVE_US 5000000
-#define TIMES 5
+#define TIMES 12
 #define BUSY_US 20000
 #define ALL_PARAMETERS 65535u
 #define CHUNK_US 500 /* two frames in a control step: the board takes three, and leaves room for commands */
