@@ -55,7 +55,9 @@ static int64_t tip_time_of(uint64_t now_us, uint16_t measured) {
 
 /* --- one message into the report */
 
-static void take_status(struct link_report *report, uint32_t state, uint32_t faults, uint32_t warnings) {
+static void take_status(struct can_assembly *assembly, uint32_t state, uint32_t faults, uint32_t warnings) {
+    struct link_report *report = &assembly->report;
+    assembly->status_known = true;
     report->status.state = (enum supervisor_state)state;
     report->status.faults = faults;
     report->status.warnings = warnings;
@@ -103,7 +105,7 @@ static void take_telemetry(struct can_assembly *assembly, const struct message_t
     const struct message_tip_position position = {all->tip_x, all->tip_y, all->tip_z, all->tip_measured};
     const struct message_tip_orientation orientation = {all->tip_qw, all->tip_qx, all->tip_qy, all->tip_qz};
     take_time(assembly, all->time_us, all->step);
-    take_status(report, all->state, all->faults, all->warnings);
+    take_status(assembly, all->state, all->faults, all->warnings);
     memcpy(report->pressure_pa, (const float[3]){all->pressure_1, all->pressure_2, all->pressure_3},
            sizeof report->pressure_pa);
     memcpy(status->pressure_target_pa, (const float[3]){all->target_1, all->target_2, all->target_3},
@@ -123,11 +125,12 @@ static void take_telemetry(struct can_assembly *assembly, const struct message_t
 static bool finish(struct can_assembly *assembly, uint64_t now_us) {
     struct link_report *report = &assembly->report;
     const uint64_t period_us = (uint64_t)REPORT_US * assembly->telemetry_slowdown;
-    if (!assembly->time_known || (assembly->reported && now_us <= assembly->reported_us)) {
+    if (!assembly->time_known || !assembly->status_known ||
+        (assembly->reported && now_us <= assembly->reported_us)) {
         return false;
     }
     if (assembly->reported) {
-        const uint64_t periods = (now_us - assembly->reported_us + period_us / 2) / period_us;
+        const uint64_t periods = (now_us - assembly->reported_us + CONTROLLER_STEP_US) / period_us;
         assembly->missing += periods > 1 ? periods - 1 : 0;
     }
     assembly->reported = true;
@@ -144,7 +147,7 @@ bool can_assembly_take(struct can_assembly *assembly, enum message_id id, const 
     struct controller_status *status = &report->status;
     switch (id) {
     case MESSAGE_STATUS:
-        take_status(report, message->status.state, message->status.faults, message->status.warnings);
+        take_status(assembly, message->status.state, message->status.faults, message->status.warnings);
         return false;
     case MESSAGE_PRESSURES:
         memcpy(report->pressure_pa, &message->pressures, sizeof report->pressure_pa);

@@ -15,6 +15,7 @@ struct can_assembly {
     uint32_t telemetry_slowdown; /* periods are so many times the table's */
     uint64_t restarts;           /* of the board */
     uint64_t missing;            /* reports that were lost on the way, by the gaps between steps */
+    bool status_known; /* no report before: its state would be made up */
     bool time_known;
     uint64_t time_us; /* of `step` */
     uint16_t step;

@@ -2,6 +2,7 @@
 
 #include <errno.h>
 #include <linux/can/error.h>
+#include <math.h>
 #include <poll.h>
 #include <signal.h>
 #include <stdio.h>
@@ -95,7 +96,7 @@ static bool send_command(struct can_link *link) {
         return send_message(link, MESSAGE_PRESSURE_COMMAND, &message);
     case COMMAND_BEND:
         message.bend_command.bend = command->bend_rad;
-        message.bend_command.direction = command->direction_rad;
+        message.bend_command.direction = (float)remainder((double)command->direction_rad, 2.0 * M_PI);
         message.bend_command.co_contraction = command->co_contraction_pa;
         return send_message(link, MESSAGE_BEND_COMMAND, &message);
     case COMMAND_CLEAR:

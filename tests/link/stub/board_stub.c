@@ -55,6 +55,7 @@ static size_t host_count;
 static int bus = -1;
 static bool is_slcan;
 static struct slcan_reader reader;
+static const struct bend_table *module_table;
 static uint32_t protocol = MESSAGE_PROTOCOL;
 static volatile sig_atomic_t cut, ended;
 
@@ -196,6 +197,14 @@ static bool open_terminal(const char *path) {
 
 /* --- the boards */
 
+/* The module is vented when this is allowed: plant and clock begin anew. */
+static void power_up(struct board *board) {
+    struct sim_parameters parameters;
+    sim_default_parameters(&parameters);
+    sim_init(&board->sim, module_table, &parameters, board->id);
+    sim_bind(&board->sim, &board->hal);
+}
+
 static void start(struct board *board) {
     node_init(&board->node, &board->setup);
     board->node.node_id = board->id;
@@ -204,12 +213,10 @@ static void start(struct board *board) {
 
 static void add(const struct table_file *file, uint32_t id) {
     struct board *board = &boards[board_count++];
-    struct sim_parameters parameters;
-    sim_default_parameters(&parameters);
-    sim_init(&board->sim, &file->table, &parameters, id);
-    sim_bind(&board->sim, &board->hal);
-    sim_storage_init(&board->storage, TABLE_SLOT_BYTES);
+    module_table = &file->table;
     board->id = id;
+    power_up(board);
+    sim_storage_init(&board->storage, TABLE_SLOT_BYTES);
     board->bus =
         (struct hal_bus){.context = board, .receive = take_queued, .send = send_out, .state = say_state};
     board->setup = (struct node_setup){.hal = &board->hal,
@@ -240,8 +247,7 @@ static void step(struct board *board) {
     show(board);
     sim_advance(&board->sim, CONTROLLER_STEP_US);
     if (board->node.reset_wanted) {
-        sim_reset(&board->sim);
-        sim_restart(&board->sim);
+        power_up(board);
         start(board);
     }
 }
