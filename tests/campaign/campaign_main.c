@@ -157,7 +157,8 @@ static void print_singles(const struct series *series, const struct trial_result
             tally_print_row(stdout, injection_at(k)->name, &row);
         }
         if (row.end[TRIAL_HARMLESS] > 0) {
-            printf("  harmless: the valves were off and pressures only fell, or they were within %.2f kPa of those without it\n",
+            printf("  harmless: the valves were off and pressures only fell, or they were within %.2f kPa of those "
+                   "without it\n",
                    1e-3 * row.apart_pa);
         }
         tally_row_close(&row);
@@ -251,7 +252,8 @@ static bool run_all(struct campaign *campaign) {
     ran = ran && run(campaign, &fittings[0], &pairs, SHOW_ALL, "all pairs") &&
           run(campaign, &fittings[0], &sound, SHOW_ALL, "nothing");
     printf("\nWhat may be fitted to the air, with valves that fail, and with a supply that rises and something else:\n");
-    printf("%-34s %-18s %7s %8s %12s %13s %9s\n", "fitted", "broken", "trials", "bursts", "over 50 ms", "never vented", "kPa");
+    printf("%-34s %-18s %7s %8s %12s %13s %9s\n", "fitted", "broken", "trials", "bursts", "over 50 ms", "never vented",
+           "kPa");
     for (size_t f = 0; f < fitted && ran; f++) {
         struct series stuck = {SERIES_SINGLE, options->seed + 1, tried, "FAULT_VALVE"};
         ran = run(campaign, &fittings[f], &stuck, SHOW_FITTING, "valves");

@@ -228,7 +228,8 @@ static void every_row_is_injected_or_says_why_not(void **state) {
     assert_int_equal(ROWS, (int)FAULT_COUNT + (int)WARNING_COUNT);
     for (size_t r = 0; r < ROWS; r++) {
         if (is_injected(rows[r]) == (injection_left_out(rows[r]) != NULL)) {
-            fail_msg("%s: %s", rows[r], is_injected(rows[r]) ? "is injected and left out" : "is neither injected nor left out");
+            fail_msg("%s: %s", rows[r],
+                     is_injected(rows[r]) ? "is injected and left out" : "is neither injected nor left out");
         }
     }
 }
