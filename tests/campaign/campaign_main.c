@@ -139,6 +139,21 @@ static void name_wrong(const struct series *series, const struct trial_result *r
     }
 }
 
+/* Pairs may hold a chamber over the working limit, but never burst it: the ones that did, by name. */
+static void list_pairs(const struct series *series, const struct trial_result *result, const bool *done) {
+    for (size_t i = 0; i < series->trials; i++) {
+        struct trial trial;
+        const struct oracle *oracle = &result[i].oracle;
+        if (done[i] && oracle->over_longest_us > TALLY_OVER_MOST_US) {
+            series_trial(series, i, &trial);
+            printf("  over the working limit: %s and %s, chambers %zu and %zu, %.2f kPa, %lld ms, seed %llu\n",
+                   name_of(trial.injection[0]), name_of(trial.injection[1]), result[i].chamber[0] + 1,
+                   result[i].chamber[1] + 1, 1e-3 * oracle->highest_pa, (long long)(oracle->over_longest_us / 1000),
+                   (unsigned long long)trial.seed);
+        }
+    }
+}
+
 static void print_singles(const struct series *series, const struct trial_result *result, const bool *done) {
     tally_print_head(stdout);
     for (size_t k = 0; k < injection_count(); k++) {
@@ -221,6 +236,7 @@ static bool run(struct campaign *campaign, const struct fitting *fitting, const 
             print_singles(series, result, done);
         } else if (shown == SHOW_ALL) {
             print_all(name, series, result, done);
+            list_pairs(series, result, done);
         } else {
             print_fitting(fitting->name, name, series, result, done);
         }
