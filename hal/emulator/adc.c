@@ -211,11 +211,20 @@ bool adc_read(void *context, uint32_t offset, uint32_t *value) {
         *value = *word;
         return true;
     }
-    if (offset == 0x40u) {
+    switch (offset) {
+    case 0x00u:
+        *value = adc->status;
+        return true;
+    case 0x08u:
+        *value = adc->control;
+        return true;
+    case 0x40u:
         adc->status &= ~ISR_EOC;
+        *value = adc->data;
+        return true;
+    default:
+        return false;
     }
-    *value = offset == 0x00u ? adc->status : offset == 0x08u ? adc->control : adc->data;
-    return offset == 0x00u || offset == 0x08u || offset == 0x40u;
 }
 
 bool adc_write(void *context, uint32_t offset, uint32_t value) {

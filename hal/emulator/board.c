@@ -76,11 +76,9 @@ static uint32_t read_word(void *context, uint32_t address) {
     const struct place *place = find(address);
     uint32_t value = 0;
     schedule_run(&board->core.schedule, board->core.now_ticks);
-    if (place == NULL) {
-        note_unknown(board, address);
-    } else if (!is_clocked(board, place)) {
+    if (place != NULL && !is_clocked(board, place)) {
         note_unclocked(board, address);
-    } else if (!place->read((char *)board + place->context, address - place->base, &value)) {
+    } else if (place == NULL || !place->read((char *)board + place->context, address - place->base, &value)) {
         note_unknown(board, address);
     }
     return value;
@@ -90,11 +88,9 @@ static void write_word(void *context, uint32_t address, uint32_t value) {
     struct board *board = context;
     const struct place *place = find(address);
     schedule_run(&board->core.schedule, board->core.now_ticks);
-    if (place == NULL) {
-        note_unknown(board, address);
-    } else if (!is_clocked(board, place)) {
+    if (place != NULL && !is_clocked(board, place)) {
         note_unclocked(board, address);
-    } else if (!place->write((char *)board + place->context, address - place->base, value)) {
+    } else if (place == NULL || !place->write((char *)board + place->context, address - place->base, value)) {
         note_unknown(board, address);
     }
 }

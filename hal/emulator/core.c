@@ -137,7 +137,7 @@ static uint8_t kind_of(uint16_t first, uint16_t second) {
 
 /* ITSTATE behind one more instruction (ARMv7-M A7.3.3). */
 static uint8_t if_then_next(uint8_t state) {
-    return (state & 7u) == 0u ? 0u : (uint8_t)((state & 0xe0u) | (state << 1 & 0x1fu));
+    return (state & 7u) == 0u ? 0u : (uint8_t)((state & 0xe0u) | ((uint32_t)state << 1 & 0x1fu));
 }
 
 static bool is_if_then(uint16_t half) {

@@ -147,14 +147,14 @@ static void refuse(struct flash *flash, uint32_t why) {
 static bool may_program(struct flash *flash, uint32_t offset, uint32_t bytes) {
     const uint32_t first = offset & ~7u;
     uint32_t why = 0u;
-    if ((flash->control & (CR_PG | CR_PER | CR_LOCK)) != CR_PG || flash->operation != FLASH_NOTHING) {
+    const bool errors_left = (flash->status & SR_CLEARABLE & ~SR_EOP) != 0;
+    const bool set_to_program = (flash->control & (CR_PG | CR_PER | CR_LOCK)) == CR_PG;
+    if (!set_to_program || flash->operation != FLASH_NOTHING || errors_left) {
         why = SR_PGSERR;
     } else if (bytes != 4u) {
         why = SR_SIZERR;
     } else if ((offset & 4u) != 0 && (!flash->have_low || flash->address != first)) {
         why = SR_PGAERR;
-    } else if ((flash->status & SR_CLEARABLE & ~SR_EOP) != 0) {
-        why = SR_PGSERR;
     }
     if (why != 0u) {
         refuse(flash, why);

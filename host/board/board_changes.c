@@ -3,6 +3,9 @@
 #include <stdarg.h>
 #include <string.h>
 
+#include "comms/codec.h"
+#include "safety/supervisor.h"
+
 #define PASSIVE_AT 128u
 
 void board_changes_cause(uint32_t cause, char *text, size_t bytes) {
@@ -35,6 +38,44 @@ static bool changed(bool *was, bool is) {
     const bool differs = *was != is;
     *was = is;
     return differs;
+}
+
+static void say_status(struct board_changes *changes, const struct message_status *status) {
+    char text[512] = "";
+    size_t used = 0;
+    for (unsigned f = 0; f < (unsigned)FAULT_COUNT && used < sizeof text; f++) {
+        if ((status->faults >> f & 1u) != 0) {
+            const int wrote = snprintf(text + used, sizeof text - used, "%s%s", used > 0 ? ", " : ": ",
+                                       supervisor_fault_describe((enum supervisor_fault)f)->name);
+            used += wrote > 0 ? (size_t)wrote : 0u;
+        }
+    }
+    say(changes, changes->board, "state: %s%s", supervisor_state_name((enum supervisor_state)status->state),
+        text);
+}
+
+static void hear(void *context, const struct can_bus_frame *frame) {
+    struct board_changes *changes = context;
+    struct message_status status;
+    struct message_trouble trouble = {0};
+    enum message_id id;
+    if (frame->frame.extended || !message_find(frame->frame.id >> MESSAGE_NODE_BITS, &id) ||
+        id != MESSAGE_STATUS || frame->frame.length != message_row(id)->bytes) {
+        return;
+    }
+    message_unpack(id, frame->frame.data, &status, &trouble);
+    if (!changes->state_known || status.state != changes->state || status.faults != changes->faults) {
+        changes->state_known = true;
+        changes->state = status.state;
+        changes->faults = status.faults;
+        say_status(changes, &status);
+    }
+}
+
+void board_changes_listen(struct board_changes *changes, struct board *board) {
+    changes->board = board;
+    board->fdcan.sent = hear;
+    board->fdcan.context = changes;
 }
 
 static void look_at_bus(struct board_changes *changes, const struct board *board) {

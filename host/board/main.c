@@ -181,6 +181,7 @@ static int run(struct session *session) {
     const struct settings *settings = session->settings;
     const int64_t end_us = settings->duration_s > 0.0 ? (int64_t)(1e6 * settings->duration_s) : INT64_MAX;
     program_catch_interrupt();
+    board_changes_listen(&session->changes, &session->board);
     pace_start(&session->pace, 0);
     while (board_time_us(&session->board) < end_us && program_interrupted == 0) {
         board_run(&session->board, SLICE_US);

@@ -167,7 +167,7 @@ static inline bool hil_has(enum supervisor_fault fault) {
 }
 
 static inline bool hil_warns(enum supervisor_warning warning) {
-    return (hil.last[MESSAGE_STATUS].status.warnings >> (unsigned)warning & 1u) != 0;
+    return ((uint32_t)hil.last[MESSAGE_STATUS].status.warnings >> (unsigned)warning & 1u) != 0;
 }
 
 #define hil_assert_state(expected)                                                                           \
