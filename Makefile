@@ -14,7 +14,7 @@ SHELL    := /bin/bash
 MAKEFLAGS += --no-builtin-rules
 include tests/tools/build.mk
 
-.PHONY: help setup all demo test bench gap-check firmware flash misra hil campaign docs-faults lint format tables clean
+.PHONY: help setup all demo test bench gap-check firmware flash misra hil campaign docs-faults docs-messages fuzz lint format tables clean
 
 help: ## list these targets
 	@grep -hE '^[a-z-]+:.*## ' Makefile | awk -F ':.*## ' '{printf "  make %-10s %s\n", $$1, $$2}'
@@ -61,6 +61,10 @@ campaign: setup ## break the simulated board in every way, alone and in pairs (M
 	@$(MAKE) --no-print-directory -j$(JOBS) $(BUILD)/tests/campaign/campaign
 	@$(BUILD)/tests/campaign/campaign $(if $(MISSIONS),-n $(MISSIONS)) $(if $(SEED),-s $(SEED)) $(if $(FAULT),-f '$(FAULT)') \
 	    -o $(if $(CSV),$(CSV),$(BUILD)/campaign.csv)
+
+docs-messages: $(BUILD)/tribend ## write docs/messages.md and docs/tribend.dbc from firmware/comms/messages.def
+	@$(BUILD)/tribend dbc --page -o docs/messages.md
+	@$(BUILD)/tribend dbc -o docs/tribend.dbc
 
 docs-faults: $(BUILD)/tests/docs/faults_page ## write docs/faults.md from firmware/safety/faults.def
 	@$(BUILD)/tests/docs/faults_page >docs/faults.md
