@@ -66,6 +66,11 @@ docs-messages: $(BUILD)/tribend ## write docs/messages.md and docs/tribend.dbc f
 	@$(BUILD)/tribend dbc --page -o docs/messages.md
 	@$(BUILD)/tribend dbc -o docs/tribend.dbc
 
+SECONDS ?= 600
+fuzz: setup ## fuzz frames, tip stream, tables and parameters (SECONDS=600 each; TARGET=frames: one of them)
+	@$(MAKE) --no-print-directory -j$(JOBS) fuzz-programs
+	@tests/fuzz/run $(BUILD) $(SECONDS) $(TARGET)
+
 docs-faults: $(BUILD)/tests/docs/faults_page ## write docs/faults.md from firmware/safety/faults.def
 	@$(BUILD)/tests/docs/faults_page >docs/faults.md
 
