@@ -1,5 +1,5 @@
-/* Frames into the node, with a controller and a module that reads constant pressures behind it. An input is a
- * series of
+/* Frames into the node, with a controller behind it and a module whose pressures go where they should. An
+ * input is a series of
  *
  *     control byte c, then:  c < 128: a frame: identifier (2 bytes, low first), length (1), that many bytes
  *                            else: c - 127 control steps
@@ -22,6 +22,8 @@ static struct tiny_table tiny;
 static struct hal_can_frame next;
 static bool waits;
 static int64_t time_us;
+static float pressure_pa[3];
+static uint32_t noise;
 static struct hal_outputs outputs;
 
 static int64_t now(void *context) {
@@ -29,12 +31,16 @@ static int64_t now(void *context) {
     return time_us;
 }
 
+/* They follow their targets, with noise enough to pass for a sensor. */
 static bool read_pressures(void *context, struct hal_pressures *pressures) {
     (void)context;
-    *pressures = (struct hal_pressures){.chamber_pa = {100.0f + (float)(time_us / 1000 % 7), 90.0f, 110.0f},
-                                        .supply_pa = 40000.0f,
-                                        .chamber_ok = {true, true, true},
-                                        .supply_ok = true};
+    *pressures =
+        (struct hal_pressures){.supply_pa = 40000.0f, .chamber_ok = {true, true, true}, .supply_ok = true};
+    for (uint32_t c = 0; c < 3u; c++) {
+        noise = noise * 1664525u + 1013904223u;
+        pressure_pa[c] += 0.01f * (node.app.controller.status.pressure_target_pa[c] - pressure_pa[c]);
+        pressures->chamber_pa[c] = pressure_pa[c] + (float)(noise >> 24);
+    }
     return true;
 }
 
@@ -103,6 +109,8 @@ int LLVMFuzzerTestOneInput(const uint8_t *bytes, size_t size) {
     static struct node_setup setup;
     uint32_t given = 0u, steps = 0u;
     time_us = 0;
+    noise = 1u;
+    memset(pressure_pa, 0, sizeof pressure_pa);
     waits = false;
     tiny_table_make(&tiny);
     sim_storage_init(&storage, 32u * SIM_STORAGE_PAGE);
