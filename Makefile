@@ -68,6 +68,7 @@ docs-messages: $(BUILD)/tribend ## write docs/messages.md and docs/tribend.dbc f
 
 SECONDS ?= 600
 fuzz: setup ## fuzz frames, tip stream, tables and parameters (SECONDS=600 each; TARGET=frames: one of them)
+	@tests/tools/setup clang
 	@$(MAKE) --no-print-directory -j$(JOBS) fuzz-programs
 	@tests/fuzz/run $(BUILD) $(SECONDS) $(TARGET)
 
