@@ -14,7 +14,7 @@ HIL_PACKAGES := user-mode-linux can-utils kmod iproute2
 # npm brings the page's plotting library. Who has npm from elsewhere keeps it: Debian's would not go beside it.
 VIEW_PACKAGES := libmicrohttpd-dev $(if $(shell command -v npm),,npm)
 # what `make test` alone needs
-TEST_PACKAGES  := chromium curl mandoc man-db bsdextrautils systemd librsvg2-bin
+TEST_PACKAGES  := chromium curl mandoc man-db bsdextrautils systemd librsvg2-bin clang python3-canmatrix
 LINT_PACKAGES  := clang clang-tidy cppcheck
 
 # --- sources: a folder is a layer; arrows between layers are include paths below
@@ -36,7 +36,8 @@ TEST_C     := $(wildcard tests/*/test_*.c)
 BENCH_C    := $(wildcard tests/bench/bench_*.c)
 CAMPAIGN_MAIN := tests/campaign/campaign_main.c
 FAULTS_PAGE_C := tests/docs/faults_page.c
-SUPPORT_C  := $(filter-out $(TEST_C) $(BENCH_C) $(FAULTS_PAGE_C) tests/campaign/%,$(wildcard tests/*/*.c))
+FUZZ_C     := $(wildcard tests/fuzz/*.c)
+SUPPORT_C  := $(filter-out $(TEST_C) $(BENCH_C) $(FAULTS_PAGE_C) tests/campaign/% $(FUZZ_C),$(wildcard tests/*/*.c))
 CAMPAIGN_C := $(filter-out $(TEST_C) $(CAMPAIGN_MAIN),$(wildcard tests/campaign/*.c))
 SOLID_C    := $(wildcard tests/model/ccx/*.c)
 BLIND_SCORE_C := $(wildcard tests/gap/blind/blind_score*.c)
@@ -236,6 +237,21 @@ $(ELF:.elf=.stack): $(ELF) tests/tools/stack_usage hal/stm32g4/indirect_calls
 .PHONY: firmware-files
 firmware-files: $(ELF) $(ELF:.elf=.stack) $(ELF:.elf=.hex) $(ELF:.elf=.bin)
 -include $(patsubst %.c,$(BOARD)/%.d,$(FIRMWARE_C) $(BOARD_C))
+
+# --- fuzz targets: libFuzzer comes with clang alone
+FUZZ_FLAGS := -O2 -g -fno-omit-frame-pointer -fsanitize=address,undefined -fno-sanitize-recover=all
+FUZZ_O     := $(patsubst %.c,$(BUILD)/fuzz/%.o,$(FIRMWARE_C) tests/support/sim_storage.c tests/support/tiny_table.c)
+FUZZ_PROGRAMS := $(patsubst tests/fuzz/%.c,$(BUILD)/fuzz/%,$(filter-out tests/fuzz/seeds.c,$(FUZZ_C)))
+.PHONY: fuzz-programs
+fuzz-programs: $(FUZZ_PROGRAMS) $(BUILD)/fuzz/seeds
+$(BUILD)/fuzz/%.o: %.c
+	@mkdir -p $(@D)
+	$(say)clang $(FUZZ_FLAGS) -fsanitize=fuzzer-no-link $(COMMON_FLAGS) -MMD -MP -c $< -o $@
+$(FUZZ_PROGRAMS): $(BUILD)/fuzz/%: $(BUILD)/fuzz/tests/fuzz/%.o $(FUZZ_O)
+	$(if $(V),,@echo '  link $@';) clang $(FUZZ_FLAGS) -fsanitize=fuzzer $(filter %.o,$^) -o $@ -lm
+$(BUILD)/fuzz/seeds: $(BUILD)/fuzz/tests/fuzz/seeds.o $(FUZZ_O)
+	$(if $(V),,@echo '  link $@';) clang $(FUZZ_FLAGS) $(filter %.o,$^) -o $@ -lm
+-include $(wildcard $(BUILD)/fuzz/*/*.d $(BUILD)/fuzz/*/*/*.d)
 
 # --- lint: every compiler that the firmware must build with, then the analysers
 ARM_FLAGS := $(ARM_CORE) -Os
