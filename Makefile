@@ -34,7 +34,7 @@ test: setup ## build and run every test (sets up what is missing first)
 	@$(MAKE) --no-print-directory -j$(JOBS) all test-programs firmware-files
 	@tests/tools/run_tests $(BUILD)
 
-bench: setup ## time equilibrium, table, simulation, diagnosis and emulated board on this machine (PART=gap: one part)
+bench: setup ## time equilibrium, table, simulation, diagnosis and emulated board, count instructions (PART=gap: one part)
 	@$(MAKE) --no-print-directory -j$(JOBS) all bench-programs firmware-files
 	@tests/tools/bench $(BUILD)
 
