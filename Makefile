@@ -15,7 +15,7 @@ SHELL    := /bin/bash
 MAKEFLAGS += --no-builtin-rules
 include tests/tools/build.mk
 
-.PHONY: help setup all demo test bench gap-check firmware flash misra hil campaign docs docs-faults lint format tables install uninstall clean
+.PHONY: help setup all demo test bench gap-check firmware flash misra hil campaign docs docs-faults docs-messages fuzz lint format tables install uninstall clean
 
 help: ## list these targets
 	@grep -hE '^[a-z-]+:.*## ' Makefile | awk -F ':.*## ' '{printf "  make %-10s %s\n", $$1, $$2}'
@@ -34,7 +34,7 @@ test: setup ## build and run every test (sets up what is missing first)
 	@$(MAKE) --no-print-directory -j$(JOBS) all test-programs firmware-files
 	@tests/tools/run_tests $(BUILD)
 
-bench: setup ## time equilibrium, table, simulation, diagnosis and emulated board on this machine (PART=gap: one part)
+bench: setup ## time equilibrium, table, simulation, diagnosis and emulated board, count instructions (PART=gap: one part)
 	@$(MAKE) --no-print-directory -j$(JOBS) all bench-programs firmware-files
 	@tests/tools/bench $(BUILD)
 
@@ -66,6 +66,16 @@ campaign: setup ## break the simulated board in every way, alone and in pairs (M
 docs: all ## check the documentation: links, subcommands, headers, drawings, the commands of its pages
 	@tests/tools/setup $(TEST_PACKAGES)
 	@TRIBEND_BUILD=$(BUILD) bash tests/docs/test_docs.sh
+
+docs-messages: $(BUILD)/tribend ## write docs/messages.md and docs/tribend.dbc from firmware/comms/messages.def
+	@$(BUILD)/tribend dbc --page -o docs/messages.md
+	@$(BUILD)/tribend dbc -o docs/tribend.dbc
+
+SECONDS ?= 600
+fuzz: setup ## fuzz frames, tip stream, tables and parameters (SECONDS=600 each; TARGET=frames: one of them)
+	@tests/tools/setup clang
+	@$(MAKE) --no-print-directory -j$(JOBS) fuzz-programs
+	@tests/fuzz/run $(BUILD) $(SECONDS) $(TARGET)
 
 docs-faults: $(BUILD)/tests/docs/faults_page ## write docs/faults.md from firmware/safety/faults.def
 	@$(BUILD)/tests/docs/faults_page >docs/faults.md

@@ -12,10 +12,9 @@
 #define ANGLE_STEP_RAD (REAL_PI / 8192.0f)
 #define ELEVATION_MOST 4096
 #define CLOCK_TICK_US 125
-#define RECORD_US_MOST 20000 /* 18 bytes take 1.6 ms; what takes longer is no one record */
-#define DRIFT_SHARE 256      /* of the time between records: far more than clocks of quartz differ by */
-#define LATE_US_MOST                                                                                         \
-    20000 /* a record that is off by more comes from a clock that was set anew, or is garbled */
+#define RECORD_US_MOST 4000 /* 18 bytes take 1.6 ms; what takes longer is no one record */
+#define DRIFT_SHARE 1024    /* of the time between records: far more than clocks of quartz differ by */
+#define LATE_US_MOST 5000   /* one that is off by more comes from a clock that was set anew, or is garbled */
 
 enum word { WORD_X = 0, WORD_AZIMUTH = 3, WORD_ELEVATION, WORD_ROLL, WORD_TIME, WORD_QUALITY, WORD_STATUS };
 

@@ -78,6 +78,7 @@ struct bend_table {
     struct bend_table_module module;
     uint32_t nodes[3];
     const float *axis_pa[3];  /* strictly rising, first 0 */
+    bool axes_alike;          /* all three hold the same pressures, so that a cell found on one is found on all */
     const float *channel[BEND_TABLE_CHANNEL_COUNT]; /* [i3 + nodes[2] * (i2 + nodes[1] * i1)] */
     const uint8_t *tag;
     uint32_t grid_bytes;  /* axes, channels, tags and padding */
@@ -115,6 +116,13 @@ bool bend_table_ballooned(const struct bend_table *table, struct bend_table *bal
 /* A sentence for people, never NULL. */
 const char *bend_table_status_text(enum bend_table_status status);
 
+/* Index of the node of axis `a` (0..2) at or below `pressure_pa`, kept so that there is a node above it. */
+uint32_t bend_table_cell(const struct bend_table *table, size_t a, float pressure_pa);
+/* All eight corners of the cell are valid. */
+bool bend_table_cell_is_valid(const struct bend_table *table, const uint32_t cell[3]);
+/* Axis `a` of the stencil alone, for a pressure within the axis that lies in `cell`. */
+void bend_table_locate_in_cell(const struct bend_table *table, size_t a, uint32_t cell, float pressure_pa,
+                               struct bend_table_stencil *stencil);
 /* Where `pressure_pa` lies; a pressure outside its axis is clamped to it, NaN to the axis' start. */
 void bend_table_locate(const struct bend_table *table, const float pressure_pa[3], struct bend_table_stencil *stencil);
 float bend_table_value(const struct bend_table *table, const struct bend_table_stencil *stencil,

@@ -85,7 +85,7 @@ void calibration_apply(const struct controller_calibration *calibration, uint32_
     loop->leak_factor = nominal->flow_factor * calibration->leak_scale[chamber];
     loop->tube_volume_m3 = nominal->tube_volume_m3 + calibration->extra_volume_m3[chamber];
     loop->nominal_capacity_m3 = nominal->nominal_capacity_m3 + calibration->extra_volume_m3[chamber];
-    loop->late_us = calibration->valve_late_us[chamber];
+    loop->late_us = (int32_t)calibration->valve_late_us[chamber]; /* at most VALVE_LATE_MOST_US */
     loop->reading_lag_s = calibration->reading_lag_s[chamber];
     loop->least_duty = calibration->least_duty[chamber];
     loop->lost_duty = real_min(calibration->lost_duty[chamber], calibration->least_duty[chamber]);

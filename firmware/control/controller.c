@@ -1,7 +1,17 @@
 /* The order of a step: correct what the sensors say, estimate pressures, look for gaps to the model, learn from the tip,
  * look for faults, take the command, let the supervisor decide, compute the targets, write duties. State that lives here:
  * the command being followed and when it came, when the last tip sample came, each chamber's capacity from the table, and
- * how far a body that is known to creep has crept. */
+ * how far a body that is known to creep has crept.
+ *
+ * A step has a bound (tests/bench), so what can wait is spread over steps. Of what looks into the table at length, a step
+ * does one: take a tip sample, judge its pose, follow the creep, predict the bend where no sensor tells it, work on the
+ * targets, or else renew the chambers' capacities. Valves take a new duty every 10 ms, so a millisecond or two is no loss.
+ *   tip         at most every TIP_STEPS, so that the others get their turn; tip sensors give up to 255 samples a second
+ *   inversion   one look at the table a step; what Newton makes of the first is within 0.1 degree of the answer already
+ *   capacity    two chambers a step, and one at the latest after CAPACITY_STEPS: in 3 ms of full flow it changes by some 2 %
+ *   late valve  its duty is worked out once a period, in one of the last three steps before it: the forecast through the
+ *               pulses on their way is long, and only the duty at the period's start counts
+ *   table       a part of its CRC-32, a small one but in steps that only renew capacities */
 #include "control/controller.h"
 
 #include <stddef.h>
@@ -12,7 +22,12 @@
 #define SUPPLY_LEAST_PA 1000.0f
 #define SELFTEST_PRESSURE_PA 2000.0f
 #define FLOW_JUDGED_FROM 50u /* control steps */
-#define CREEP_STEPS 10u /* control steps between looks at the creep, which takes a hundred times as long */
+#define PREDICTION_STEPS 10u /* control steps between looks at the creep, which takes a hundred times as long, and at the
+                                bend where no sensor tells it */
+#define TIP_STEPS 3u      /* control steps from one tip sample to the next, at least */
+#define CAPACITY_STEPS 3u /* without a capacity renewed, at most */
+
+enum look { LOOK_ELSEWHERE = 0, LOOK_FOR_TARGETS, LOOK_IDLE };
 
 void controller_default_parameters(struct controller_parameters *parameters, const struct bend_table *table) {
     *parameters = (struct controller_parameters){
@@ -48,6 +63,34 @@ void controller_set_parameters(struct controller *controller, const struct contr
     controller_seal_parameters(controller);
 }
 
+/* V + p_abs dV/dp of chamber `c` with its tube; the pull of the other chambers on V is left to the observer. */
+static float capacity_of(const struct controller *controller, const struct bend_table_stencil *stencil, uint32_t c) {
+    const struct pressure_loop_parameters *parameters = &controller->loop_parameters[c];
+    const float length_m = controller->table->module.chamber_length_m;
+    float gradient[3];
+    const float volume_m2 = bend_table_gradient(
+        controller->table, stencil, (enum bend_table_channel)((uint32_t)BEND_TABLE_VOLUME_1 + c), gradient);
+    const float pressure_pa_abs = parameters->ambient_pa_abs + controller->pressure_loop[c].estimate_pa;
+    return parameters->tube_volume_m3 + length_m * (volume_m2 + pressure_pa_abs * real_max(gradient[c], 0.0f));
+}
+
+/* The next `count` chambers', at the estimated pressures. */
+static void update_capacities(struct controller *controller, uint32_t count) {
+    const float pressure_pa[3] = {controller->pressure_loop[0].estimate_pa, controller->pressure_loop[1].estimate_pa,
+                                  controller->pressure_loop[2].estimate_pa};
+    struct bend_table_stencil stencil;
+    if (controller->table == NULL) {
+        return;
+    }
+    bend_table_locate(controller->table, pressure_pa, &stencil);
+    for (uint32_t i = 0; i < count; i++) {
+        const uint32_t c = controller->capacity_next;
+        controller->capacity_m3[c] = capacity_of(controller, &stencil, c);
+        controller->capacity_next = c < 2u ? c + 1u : 0u;
+    }
+    controller->capacity_taken = controller->step;
+}
+
 void controller_init(struct controller *controller, const struct bend_table *table,
                      const struct controller_parameters *parameters) {
     *controller = (struct controller){.table = table};
@@ -64,6 +107,8 @@ void controller_init(struct controller *controller, const struct bend_table *tab
         sensor_watch_init(&controller->sensor_watch[c]);
         flow_watch_init(&controller->flow_watch[c]);
     }
+    update_capacities(controller, 3u);
+    controller->tip_taken = 0u - TIP_STEPS;
     controller->tip_lost = true;
     controller->status.state = SUPERVISOR_BOOT;
 }
@@ -78,19 +123,14 @@ static void correct(const struct controller *controller, struct controller_input
         input->pressure_pa[c] = calibration_pressure(calibration, c, input->pressure_pa[c], noise_pa,
                                                      controller->pressure_loop[c].estimate_pa);
     }
-    input->tip_measured_us -= calibration->tip_late_us;
-    calibration_pose(&controller->frames, input->tip_position_m, input->tip_quaternion);
 }
 
 /* By implicit Euler steps, so that no time constant is too short for them. */
 static void follow_creep(struct controller *controller) {
     const struct controller_calibration *calibration = &controller->parameters.calibration;
     float elastic_rad[2], *known_rad = controller->tip_loop.known_rad;
-    if (!controller->creeps || controller->table == NULL || controller->step % CREEP_STEPS != 0u) {
-        return;
-    }
     tip_loop_predict(controller->table, controller->status.pressure_estimate_pa, elastic_rad);
-    const float step_s = 1e-6f * (float)(CREEP_STEPS * (uint32_t)CONTROLLER_STEP_US);
+    const float step_s = 1e-6f * (float)(PREDICTION_STEPS * (uint32_t)CONTROLLER_STEP_US);
     for (uint32_t i = 0; i < 2u; i++) {
         known_rad[i] = 0.0f;
         for (uint32_t k = 0; k < CALIBRATION_CREEP_TERMS; k++) {
@@ -100,21 +140,11 @@ static void follow_creep(struct controller *controller) {
             known_rad[i] += controller->crept_rad[k][i];
         }
     }
+    controller->creep_due = false;
     controller->targets_stale = true;
 }
 
 /* --- pressures --- */
-
-/* V + p_abs dV/dp of chamber `c` with its tube; the pull of the other chambers on V is left to the observer. */
-static float capacity_of(const struct controller *controller, const struct bend_table_stencil *stencil, uint32_t c) {
-    const struct pressure_loop_parameters *parameters = &controller->loop_parameters[c];
-    const float length_m = controller->table->module.chamber_length_m;
-    float gradient[3];
-    const float volume_m2 = bend_table_gradient(
-        controller->table, stencil, (enum bend_table_channel)((uint32_t)BEND_TABLE_VOLUME_1 + c), gradient);
-    const float pressure_pa_abs = parameters->ambient_pa_abs + controller->pressure_loop[c].estimate_pa;
-    return parameters->tube_volume_m3 + length_m * (volume_m2 + pressure_pa_abs * real_max(gradient[c], 0.0f));
-}
 
 static float supply_of(const struct controller *controller, const struct controller_input *input) {
     const bool known = input->supply_ok && real_is_finite(input->supply_pa) && input->supply_pa > SUPPLY_LEAST_PA;
@@ -128,7 +158,7 @@ static void estimate(struct controller *controller, const struct controller_inpu
         struct pressure_loop *loop = &controller->pressure_loop[c];
         if (controller->step > 0u) {
             pressure_loop_predict(loop, parameters, supply_of(controller, input), controller->capacity_m3[c],
-                                  input->time_us, CONTROLLER_STEP_US);
+                                  &controller->clock);
         }
         if (input->pressure_ok[c] && real_is_finite(input->pressure_pa[c])) {
             pressure_loop_correct(loop, parameters, input->pressure_pa[c], controller->capacity_m3[c],
@@ -136,13 +166,6 @@ static void estimate(struct controller *controller, const struct controller_inpu
         }
         pressure_pa[c] = loop->estimate_pa;
         controller->status.pressure_estimate_pa[c] = loop->estimate_pa;
-    }
-    if (controller->table != NULL) {
-        struct bend_table_stencil stencil;
-        bend_table_locate(controller->table, pressure_pa, &stencil);
-        for (uint32_t c = 0; c < 3u; c++) {
-            controller->capacity_m3[c] = capacity_of(controller, &stencil, c);
-        }
     }
     tip_loop_store(&controller->tip_loop, pressure_pa);
 }
@@ -159,35 +182,30 @@ static void watch_pressures(struct controller *controller, const struct controll
             .estimate_pa = loop->estimate_pa,
             .unmodelled_pa = loop->unmodelled_pa,
             .capacity_m3 = controller->table != NULL ? controller->capacity_m3[c] : 0.0f,
-            .vented_us = input->time_us - loop->close_at_us};
+            .vented_us = pressure_loop_vented_us(loop, &controller->clock)};
     }
     gap_monitor_follow_pressures(&controller->gap_monitor, &controller->parameters.gap_monitor, pressure,
                                  (float)CONTROLLER_STEP_US * 1e-6f);
 }
 
-static void keep_pose(struct controller *controller, const struct controller_input *input) {
+static void keep_pose(struct controller *controller) {
     const struct tip_loop *loop = &controller->tip_loop;
     struct gap_monitor_pose *pose = &controller->pose;
-    pose->measured_us = input->tip_measured_us;
+    pose->measured_us = controller->tip.measured_us;
     for (uint32_t i = 0; i < 2u; i++) {
         pose->bend_rad[i] = loop->measured_rad[i];
         pose->gap_rad[i] = loop->gap_rad[i];
     }
     for (uint32_t i = 0; i < 3u; i++) {
-        pose->position_m[i] = input->tip_position_m[i];
+        pose->position_m[i] = controller->tip.position_m[i];
     }
     controller->pose_waits = true;
 }
 
-/* Takes the tip sample of the step before: that step had the table to invert. */
-static void watch_gap(struct controller *controller, const struct controller_input *input) {
-    watch_pressures(controller, input);
-    if (controller->pose_waits) {
-        gap_monitor_follow_pose(&controller->gap_monitor, &controller->parameters.gap_monitor, controller->table,
-                                &controller->tip_loop.stencil, &controller->pose);
-        controller->pose_waits = false;
-    }
-    controller->status.gap = controller->gap_monitor.report;
+static void judge_pose(struct controller *controller) {
+    gap_monitor_follow_pose(&controller->gap_monitor, &controller->parameters.gap_monitor, controller->table,
+                            &controller->tip_loop.stencil, &controller->pose);
+    controller->pose_waits = false;
 }
 
 /* --- tip --- */
@@ -197,9 +215,9 @@ static float highest_pressure(const struct controller *controller) {
     return real_max(real_max(loop[0].estimate_pa, loop[1].estimate_pa), loop[2].estimate_pa);
 }
 
-static void watch_bend(struct controller *controller, const struct controller_input *input) {
+static void watch_bend(struct controller *controller, int64_t time_us) {
     const struct pressure_loop *loop = controller->pressure_loop;
-    const struct tip_watch_view view = {.time_us = input->time_us,
+    const struct tip_watch_view view = {.time_us = time_us,
                                         .measured_rad = controller->tip_loop.measured_rad,
                                         .gap_rad = controller->tip_loop.gap_rad,
                                         .push_radppa = (const float(*)[2])controller->gap_monitor.push_radppa,
@@ -209,49 +227,99 @@ static void watch_bend(struct controller *controller, const struct controller_in
     tip_watch_follow(&controller->tip_watch, &controller->parameters.tip_watch, &view, controller->tip_loop.correction_rad);
 }
 
-static void follow_tip(struct controller *controller, const struct controller_input *input) {
-    const struct controller_parameters *parameters = &controller->parameters;
-    if (input->tip_new) {
-        const struct tip_watch_sample sample = {input->time_us, input->tip_position_m, input->tip_quaternion,
-                                                input->tip_status};
-        const bool good = tip_watch_take(&controller->tip_watch, &parameters->tip_watch,
-                                         controller->table != NULL ? &controller->table->module : NULL, &sample) &&
-                          tip_loop_update(&controller->tip_loop, &parameters->tip_loop, controller->table,
-                                          input->tip_quaternion, input->time_us - input->tip_measured_us,
-                                          CONTROLLER_STEP_US);
-        controller->status.tip_samples += good ? 1u : 0u;
-        controller->status.tip_rejected += good ? 0u : 1u;
-        if (good) {
-            controller->tip_us = input->time_us;
-            controller->tip_lost = false;
-            controller->targets_stale = true;
-        }
-        if (good && controller->tip_loop.compared) {
-            watch_bend(controller, input);
-            keep_pose(controller, input);
-        }
+/* Keeps a new sample until its turn. */
+static void receive_tip(struct controller *controller, const struct controller_input *input) {
+    struct controller_tip *tip = &controller->tip;
+    if (!input->tip_new) {
+        return;
     }
-    const bool overdue = input->time_us - controller->tip_us >= parameters->tip_period_us + parameters->tip_overdue_us;
+    controller->status.tip_overtaken += controller->tip_waits ? 1u : 0u;
+    controller->tip_waits = true;
+    tip->measured_us = input->tip_measured_us - controller->parameters.calibration.tip_late_us;
+    tip->status = input->tip_status;
+    for (uint32_t i = 0; i < 3u; i++) {
+        tip->position_m[i] = input->tip_position_m[i];
+    }
+    for (uint32_t i = 0; i < 4u; i++) {
+        tip->quaternion[i] = input->tip_quaternion[i];
+    }
+}
+
+static void follow_tip(struct controller *controller, int64_t time_us) {
+    struct controller_tip *tip = &controller->tip;
+    calibration_pose(&controller->frames, tip->position_m, tip->quaternion);
+    const struct tip_watch_sample sample = {time_us, tip->position_m, tip->quaternion, tip->status};
+    const bool good = tip_watch_take(&controller->tip_watch, &controller->parameters.tip_watch,
+                                     controller->table != NULL ? &controller->table->module : NULL, &sample) &&
+                      tip_loop_update(&controller->tip_loop, &controller->parameters.tip_loop, controller->table,
+                                      tip->quaternion, time_us - tip->measured_us, CONTROLLER_STEP_US);
+    controller->tip_waits = false;
+    controller->tip_taken = controller->step;
+    controller->status.tip_samples += good ? 1u : 0u;
+    controller->status.tip_rejected += good ? 0u : 1u;
+    if (good) {
+        controller->tip_us = time_us;
+        controller->tip_lost = false;
+        controller->targets_stale = true;
+    }
+    if (good && controller->tip_loop.compared) {
+        watch_bend(controller, time_us);
+        keep_pose(controller);
+    }
+}
+
+static void watch_tip(struct controller *controller, int64_t time_us) {
+    const struct controller_parameters *parameters = &controller->parameters;
+    const bool overdue = time_us - controller->tip_us >= parameters->tip_period_us + parameters->tip_overdue_us;
     if (overdue && !controller->tip_lost) {
         controller->tip_lost = true; /* the last correction is kept: it is the best that is known of the model's error */
         controller->status.tip_lost_count++;
     }
 }
 
+/* Without a tip sensor, what the table makes of the pressures, as often as samples would come. */
+static void predict_bend(struct controller *controller) {
+    const struct tip_loop *loop = &controller->tip_loop;
+    float bend[2];
+    tip_loop_predict(controller->table, controller->status.pressure_estimate_pa, bend);
+    for (uint32_t i = 0; i < 2u; i++) {
+        controller->predicted_rad[i] = bend[i] + loop->correction_rad[i] + (controller->creeps ? loop->known_rad[i] : 0.0f);
+    }
+    controller->prediction_due = false;
+}
+
 static void report_bend(struct controller *controller) {
-    float bend[2] = {controller->tip_loop.measured_rad[0], controller->tip_loop.measured_rad[1]};
-    if (controller->tip_lost && controller->table != NULL) {
-        tip_loop_predict(controller->table, controller->status.pressure_estimate_pa, bend);
-        bend[0] += controller->tip_loop.correction_rad[0];
-        bend[1] += controller->tip_loop.correction_rad[1];
-    }
-    if (controller->tip_lost && controller->creeps) {
-        bend[0] += controller->tip_loop.known_rad[0];
-        bend[1] += controller->tip_loop.known_rad[1];
-    }
+    const float *bend = controller->tip_lost && controller->table != NULL ? controller->predicted_rad
+                                                                          : controller->tip_loop.measured_rad;
     controller->status.bend_rad = real_hypot(bend[0], bend[1]);
     controller->status.direction_rad = real_atan2(bend[1], bend[0]);
     controller->status.bend_is_measured = !controller->tip_lost;
+}
+
+/* This step's one look into the table at length. `aims`: the targets want it. */
+static enum look look(struct controller *controller, int64_t time_us, bool aims) {
+    const bool overdue = controller->step - controller->capacity_taken > CAPACITY_STEPS;
+    if (controller->table != NULL && controller->step % PREDICTION_STEPS == 0u) {
+        controller->creep_due = controller->creeps;
+        controller->prediction_due = controller->tip_lost;
+    }
+    if (overdue) {
+        update_capacities(controller, 1u);
+    } else if (controller->tip_waits && controller->step - controller->tip_taken >= TIP_STEPS) {
+        follow_tip(controller, time_us);
+    } else if (controller->pose_waits) {
+        judge_pose(controller);
+    } else if (controller->creep_due) {
+        follow_creep(controller);
+    } else if (controller->prediction_due) {
+        predict_bend(controller);
+    } else if (aims) {
+        return LOOK_FOR_TARGETS;
+    } else {
+        update_capacities(controller, 2u);
+        return LOOK_IDLE;
+    }
+    return LOOK_ELSEWHERE;
 }
 
 /* --- commands --- */
@@ -285,11 +353,11 @@ static enum supervisor_request request_of(const struct controller_command *comma
     }
 }
 
-static uint32_t find_corruption(struct controller *controller, const struct controller_input *input) {
+static uint32_t find_corruption(struct controller *controller, const struct controller_input *input, bool busy) {
     const uint32_t count = controller->parameters.limits.parameter_bytes_per_step;
     uint32_t faults = 0u;
     if (controller->table != NULL &&
-        limits_check_table(&controller->limits, &controller->parameters.limits, controller->table)) {
+        limits_check_table(&controller->limits, &controller->parameters.limits, controller->table, busy)) {
         faults |= 1u << FAULT_TABLE_CORRUPT;
     }
     const bool odd = controller->step % 2u != 0u;
@@ -349,7 +417,7 @@ static bool is_doubted(const struct controller *controller) {
 
 /* Whether a sensor is broken shows in what it `shows` itself, whether a chamber bursts in the pressure behind that. */
 static uint32_t find_faults(struct controller *controller, const struct controller_input *input,
-                            const struct controller_input *shows) {
+                            const struct controller_input *shows, bool busy) {
     const struct limits_parameters *limits = &controller->parameters.limits;
     uint32_t faults = limits_check_pressures(limits, shows->pressure_pa, shows->pressure_ok);
     faults &= ~(1u << FAULT_OVERPRESSURE);
@@ -367,13 +435,13 @@ static uint32_t find_faults(struct controller *controller, const struct controll
     if (tip_watch_disagrees(&controller->tip_watch, &controller->parameters.tip_watch, input->time_us)) {
         faults |= 1u << FAULT_SENSORS_DISAGREE;
     }
-    return faults | find_corruption(controller, input) | find_board_faults(controller, input, highest_pa);
+    return faults | find_corruption(controller, input, busy) | find_board_faults(controller, input, highest_pa);
 }
 
 static void supervise(struct controller *controller, const struct controller_input *input,
-                      const struct controller_input *shows) {
+                      const struct controller_input *shows, bool busy) {
     const struct controller_command *command = &input->command;
-    const uint32_t present = find_faults(controller, input, shows);
+    const uint32_t present = find_faults(controller, input, shows, busy);
     bool healthy = true; /* the self-test waits until every chamber has vented, should it run into a restart */
     for (uint32_t c = 0; c < 3u; c++) {
         healthy = healthy && input->pressure_pa[c] < SELFTEST_PRESSURE_PA;
@@ -399,20 +467,37 @@ static void supervise(struct controller *controller, const struct controller_inp
 
 /* --- targets and duties --- */
 
-static void aim_at_bend(struct controller *controller) {
+static void take_up_bend(struct controller *controller) {
     const struct controller_command *command = &controller->active;
     const float *correction = controller->tip_loop.correction_rad, *known = controller->tip_loop.known_rad;
     const float x = command->bend_rad * real_cos(command->direction_rad) - correction[0] - known[0];
     const float y = command->bend_rad * real_sin(command->direction_rad) - correction[1] - known[1];
     /* no bend wanted means no pressure, whatever the sensor's noise says */
     const bool none = !(command->bend_rad > 0.0f);
-    const struct bend_inverse_request request = {none ? 0.0f : real_hypot(x, y), real_atan2(y, x),
-                                                 command->co_contraction_pa};
-    bend_inverse_solve(controller->table, &request, controller->status.inverse.pressure_pa, &controller->status.inverse);
+    const float bend_rad[2] = {none ? 0.0f : x, none ? 0.0f : y};
+    bend_inverse_begin(&controller->inversion, controller->table, bend_rad, command->co_contraction_pa);
+    controller->inverting = true;
+    controller->targets_stale = false;
+}
+
+/* A request that comes during an inversion waits for its end, some steps, so that a stream of them starves none. */
+static void aim_at_bend(struct controller *controller) {
+    struct bend_inverse *inversion = &controller->inversion;
+    float wanted_pa[3];
+    if (!controller->inverting) {
+        take_up_bend(controller);
+    }
+    const float floor_pa = inversion->plane.floor_pa;
+    if (bend_inverse_step(inversion)) {
+        controller->inverting = false;
+        bend_inverse_finish(inversion, &controller->status.inverse);
+    }
+    if (!bend_inverse_preview(inversion, wanted_pa)) {
+        return; /* the targets stay until there are better ones */
+    }
     for (uint32_t c = 0; c < 3u; c++) {
-        const float wanted_pa = controller->status.inverse.pressure_pa[c];
-        const bool idle = wanted_pa < controller->parameters.idle_pressure_pa && wanted_pa > command->co_contraction_pa;
-        controller->status.pressure_target_pa[c] = idle ? command->co_contraction_pa : wanted_pa;
+        const bool idle = wanted_pa[c] < controller->parameters.idle_pressure_pa && wanted_pa[c] > floor_pa;
+        controller->status.pressure_target_pa[c] = idle ? floor_pa : wanted_pa[c];
     }
 }
 
@@ -432,21 +517,30 @@ static void aim_at_pressures(struct controller *controller) {
     }
 }
 
-static void aim(struct controller *controller) {
+static void aim(struct controller *controller, bool may_look) {
     struct controller_status *status = &controller->status;
     if (!supervisor_valves_enabled(&controller->supervisor)) {
         for (uint32_t c = 0; c < 3u; c++) {
             status->pressure_target_pa[c] = 0.0f;
         }
         status->inverse.flags = 0u;
+        controller->inverting = controller->targets_stale = false;
     } else if (controller->active.kind == COMMAND_BEND) {
-        if (controller->targets_stale) {
+        if (may_look && (controller->targets_stale || controller->inverting)) {
             aim_at_bend(controller);
         }
-    } else if (controller->targets_stale) {
+    } else if (may_look && controller->targets_stale) {
         aim_at_pressures(controller);
+        controller->inverting = controller->targets_stale = false;
     }
-    controller->targets_stale = false;
+}
+
+/* Always, but of a late valve, which has its turn among the last steps of a period. */
+static bool duty_is_due(const struct controller *controller, uint32_t c) {
+    const struct pressure_loop_parameters *parameters = &controller->loop_parameters[c];
+    const int32_t left_us = (int32_t)parameters->pwm_period_us - controller->clock.phase_us, step_us = CONTROLLER_STEP_US;
+    const bool turn = left_us > (int32_t)c * step_us && left_us <= ((int32_t)c + 1) * step_us;
+    return parameters->late_us == 0 || turn || !(controller->status.pressure_target_pa[c] > 0.0f);
 }
 
 static void drive(struct controller *controller, const struct controller_input *input,
@@ -457,12 +551,14 @@ static void drive(struct controller *controller, const struct controller_input *
         const struct pressure_loop_parameters *parameters = &controller->loop_parameters[c];
         struct pressure_loop *loop = &controller->pressure_loop[c];
         output->duty[c] = 0.0f;
-        if (output->valves_enabled) {
+        if (!output->valves_enabled) {
+            pressure_loop_vent(loop, parameters, &controller->clock);
+        } else if (duty_is_due(controller, c)) {
             output->duty[c] = pressure_loop_duty(loop, parameters, controller->status.pressure_target_pa[c],
                                                  supply_of(controller, input), controller->capacity_m3[c],
-                                                 input->time_us);
+                                                 &controller->clock);
         } else {
-            pressure_loop_vent(loop, parameters, input->time_us);
+            output->duty[c] = pressure_loop_same_duty(loop, parameters);
         }
     }
 }
@@ -495,16 +591,21 @@ static uint32_t find_warnings(const struct controller *controller, const struct 
 void controller_step(struct controller *controller, const struct controller_input *input,
                      struct controller_output *output) {
     struct controller_input corrected = *input;
+    controller->clock = pressure_loop_clock_at(input->time_us, controller->parameters.pressure_loop.pwm_period_us,
+                                               CONTROLLER_STEP_US);
     correct(controller, &corrected);
     estimate(controller, &corrected);
-    follow_creep(controller);
-    watch_gap(controller, &corrected);
-    follow_tip(controller, &corrected);
-    supervise(controller, &corrected, input);
-    aim(controller);
+    watch_pressures(controller, &corrected);
+    receive_tip(controller, input);
+    const bool aims = controller->inverting || controller->targets_stale || input->command.kind != COMMAND_NONE;
+    const enum look looks = look(controller, input->time_us, aims);
+    watch_tip(controller, input->time_us);
+    supervise(controller, &corrected, input, looks != LOOK_IDLE);
+    aim(controller, looks == LOOK_FOR_TARGETS);
     drive(controller, &corrected, output);
     report_bend(controller);
     controller->step++;
+    controller->status.gap = controller->gap_monitor.report;
     struct controller_status *status = &controller->status;
     status->state = controller->supervisor.state;
     status->faults = controller->supervisor.faults;

@@ -83,6 +83,13 @@ struct controller_output {
     bool supply_enabled;
 };
 
+struct controller_tip {
+    int64_t measured_us;
+    float position_m[3];
+    float quaternion[4];
+    uint16_t status;
+};
+
 /* What status messages, logs and displays show. */
 struct controller_status {
     enum supervisor_state state;
@@ -93,9 +100,10 @@ struct controller_status {
     float bend_rad;        /* measured where the tip is good, else predicted from pressures */
     float direction_rad;
     bool bend_is_measured;
-    struct bend_inverse_result inverse;
+    struct bend_inverse_result inverse; /* the last that was finished; targets follow one on its way, too */
     uint32_t tip_samples;
     uint32_t tip_rejected;
+    uint32_t tip_overtaken; /* waited for their turn until a newer one came */
     uint32_t tip_lost_count;
     uint32_t commands_refused;
     uint32_t calibration_limited; /* numbers of the calibration that were out of bounds */
@@ -120,19 +128,30 @@ struct controller {
     struct pressure_loop pressure_loop[3];
     struct pressure_loop_parameters loop_parameters[3]; /* each chamber's, calibrated */
     struct calibration_frames frames;                   /* of the tip sensor */
-    bool creeps;
+    float predicted_rad[2];         /* bend vector, while the tip sensor is lost */
     float crept_rad[CALIBRATION_CREEP_TERMS][2];
     struct tip_loop tip_loop;
     struct gap_monitor gap_monitor;
     struct gap_monitor_pose pose; /* the last good tip sample, for the gap monitor */
-    bool pose_waits;              /* for the next step to take it */
+    struct controller_tip tip;    /* a sample, waiting or taken last */
     struct controller_command active;
     int64_t command_us;
     int64_t tip_us;
-    bool tip_lost;
-    bool targets_stale;    /* a new command or tip sample since the targets were computed */
-    uint32_t step;
+    struct bend_inverse inversion;
+    struct pressure_loop_clock clock;
     float capacity_m3[3];
+    uint32_t capacity_next;  /* the chamber whose turn it is */
+    uint32_t capacity_taken; /* step of the last */
+    uint32_t step;
+    uint32_t tip_taken;  /* step of the last tip sample */
+    bool tip_lost;
+    bool targets_stale;  /* a new command or tip sample since the targets were taken up */
+    bool inverting;      /* the inversion is under way */
+    bool creeps;
+    bool tip_waits;      /* these four: for their turn, see controller.c */
+    bool pose_waits;
+    bool creep_due;
+    bool prediction_due;
 };
 
 /* The nominal board and plant of the design page; limits from the table's module where there is one. */

@@ -40,7 +40,7 @@ bool tip_loop_bend_of(const float quaternion[4], float bend_rad[2]) {
     return true;
 }
 
-static void predict_at(const struct bend_table *table, const struct bend_table_stencil *stencil, float bend_rad[2]) {
+void tip_loop_predict_at(const struct bend_table *table, const struct bend_table_stencil *stencil, float bend_rad[2]) {
     bend_rad[0] = table->module.active_length_m * bend_table_value(table, stencil, BEND_TABLE_CURVATURE_X);
     bend_rad[1] = table->module.active_length_m * bend_table_value(table, stencil, BEND_TABLE_CURVATURE_Y);
 }
@@ -48,7 +48,7 @@ static void predict_at(const struct bend_table *table, const struct bend_table_s
 void tip_loop_predict(const struct bend_table *table, const float pressure_pa[3], float bend_rad[2]) {
     struct bend_table_stencil stencil;
     bend_table_locate(table, pressure_pa, &stencil);
-    predict_at(table, &stencil, bend_rad);
+    tip_loop_predict_at(table, &stencil, bend_rad);
 }
 
 /* The estimates `age_us` ago, between the two steps next to it. */
@@ -88,7 +88,7 @@ bool tip_loop_update(struct tip_loop *loop, const struct tip_loop_parameters *pa
         return true; /* a good sample, from before the history began */
     }
     bend_table_locate(table, pressure_pa, &loop->stencil);
-    predict_at(table, &loop->stencil, predicted);
+    tip_loop_predict_at(table, &loop->stencil, predicted);
     for (uint32_t i = 0; i < 2u; i++) {
         loop->gap_rad[i] = measured[i] - predicted[i] - loop->known_rad[i];
         loop->correction_rad[i] += parameters->gain * (loop->gap_rad[i] - loop->correction_rad[i]);

@@ -35,7 +35,8 @@ void tip_loop_init(struct tip_loop *loop);
 void tip_loop_store(struct tip_loop *loop, const float pressure_pa[3]);
 /* Bend vector of a tip's orientation (w, x, y, z): false for what is no unit quaternion within 5 %. */
 bool tip_loop_bend_of(const float quaternion[4], float bend_rad[2]);
-/* Bend vector that the table gives. */
+/* Bend vector that the table gives, at a place that is already located, or at pressures. */
+void tip_loop_predict_at(const struct bend_table *table, const struct bend_table_stencil *stencil, float bend_rad[2]);
 void tip_loop_predict(const struct bend_table *table, const float pressure_pa[3], float bend_rad[2]);
 /* A sample that was true `age_us` ago. False: refused. `table` NULL only records the measured bend. */
 bool tip_loop_update(struct tip_loop *loop, const struct tip_loop_parameters *parameters,

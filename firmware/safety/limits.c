@@ -17,9 +17,10 @@ void limits_default_parameters(struct limits_parameters *parameters, const struc
         .over_working_pa = 1.05f * working_pa, /* a step to the working limit overshoots by 3.4 % at most */
         .over_working_steps = 20u,
         .sensor_least_pa = -2500.0f,
-        .sensor_most_pa = 49900.0f,  /* of a range that ends at 50 kPa: a broken wire reads full scale */
-        .table_bytes_per_step = 64u, /* eight instructions a byte */
-        .parameter_bytes_per_step = 8u,
+        .sensor_most_pa = 49900.0f,   /* of a range that ends at 50 kPa: a broken wire reads full scale */
+        .table_bytes_per_step = 320u, /* a round of the reference table takes about a second */
+        .table_bytes_busy = 96u,      /* 1.9 s, were every step busy */
+        .parameter_bytes_per_step = 16u,
     };
 }
 
@@ -61,7 +62,7 @@ bool limits_check_image(struct limits_image *image, const uint8_t *bytes, uint32
 }
 
 bool limits_check_table(struct limits *limits, const struct limits_parameters *parameters,
-                        const struct bend_table *table) {
+                        const struct bend_table *table, bool busy) {
     return limits_check_image(&limits->table, table->image + COVERED_FROM, table->image_bytes - COVERED_FROM,
-                              table->image_crc, parameters->table_bytes_per_step);
+                              table->image_crc, busy ? parameters->table_bytes_busy : parameters->table_bytes_per_step);
 }

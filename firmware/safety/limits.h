@@ -16,8 +16,9 @@ struct limits_parameters {
     uint32_t over_working_steps;
     float sensor_least_pa; /* readings outside are a sensor fault */
     float sensor_most_pa;
-    uint32_t table_bytes_per_step;     /* of the table's image checked in each step, */
-    uint32_t parameter_bytes_per_step; /* and of the parameters */
+    uint32_t table_bytes_per_step; /* of the table's image checked in a step that has little else to do ... */
+    uint32_t table_bytes_busy;     /* ... and in one that has */
+    uint32_t parameter_bytes_per_step; /* of the parameters, in each step */
 };
 
 /* A check-sum of some memory, taken in parts. */
@@ -46,6 +47,6 @@ bool limits_check_image(struct limits_image *image, const uint8_t *bytes, uint32
                         uint32_t count);
 /* The same of the table's image. */
 bool limits_check_table(struct limits *limits, const struct limits_parameters *parameters,
-                        const struct bend_table *table);
+                        const struct bend_table *table, bool busy);
 
 #endif

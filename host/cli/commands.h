@@ -27,6 +27,8 @@ int cli_import(int argc, char **argv);
 int cli_gap(int argc, char **argv);
 int cli_effects(int argc, char **argv);
 int cli_run(int argc, char **argv);
+int cli_decode(int argc, char **argv);
+int cli_dbc(int argc, char **argv);
 int cli_board(int argc, char **argv);
 int cli_view(int argc, char **argv);
 int cli_bridge(int argc, char **argv);

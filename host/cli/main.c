@@ -15,6 +15,8 @@ static const struct program_subcommand subcommands[] = {
     {"plot", cli_plot, "draw a recorded run"},
     {"record", cli_record, "write down what a controller does, without commanding it"},
     {"import", cli_import, "make a run log of another lab's recording"},
+    {"decode", cli_decode, "say what CAN frames mean"},
+    {"dbc", cli_dbc, "write the CAN messages as a DBC file"},
     {"effects", cli_effects, "list what the simulated module can be given, and what each leaves in a recording"},
     {"board", cli_board, "run the flashed firmware on an emulated board with the simulated module"},
     {"view", cli_view, "serve the live view, a page for a browser"},

@@ -1,131 +1,46 @@
 #include "log/candump.h"
 
-#include <ctype.h>
 #include <errno.h>
 #include <stdlib.h>
 #include <string.h>
 
 #include "log/can_layout.h"
+#include "log/can_text.h"
 #include "log/event_rows.h"
 
-#define FD_BYTES_MAX 64
-#define CLASSIC_BYTES_MAX 8
-#define STANDARD_DIGITS 3
-#define EXTENDED_DIGITS 8
 #define MERGE_US 2000 /* the messages of one control step follow each other on the bus within this */
-#define US_PER_S 1000000
-
-struct frame {
-    int64_t time_us;
-    uint32_t identifier;
-    bool standard; /* 11 bits */
-    bool remote;
-    size_t bytes;
-    uint8_t data[FD_BYTES_MAX];
-};
 
 struct candump {
     int node;
     struct event_rows rows;
     struct candump_counts *counts;
+    bool tip_known;
+    uint16_t tip_measured;       /* of TELEMETRY's last tip sample */
     const char *first_malformed; /* what was wrong with it */
 };
 
-/* --- one line; each parser moves `at` on, and returns what is wrong or NULL --- */
-
-static bool parse_digits(const char **at, size_t digits_most, int64_t *value, size_t *digits) {
-    *value = 0;
-    for (*digits = 0; isdigit((unsigned char)**at) && *digits < digits_most; (*digits)++, (*at)++) {
-        *value = *value * 10 + (**at - '0');
-    }
-    return *digits > 0;
-}
-
-static const char *parse_time(const char **at, int64_t *time_us) {
-    int64_t seconds = 0, fraction = 0;
-    size_t digits = 0;
-    if (*(*at)++ != '(' || !parse_digits(at, 12, &seconds, &digits) || *(*at)++ != '.' ||
-        !parse_digits(at, 6, &fraction, &digits) || digits != 6 || *(*at)++ != ')' || *(*at)++ != ' ') {
-        return "no time such as (1700000000.123456) at its start";
-    }
-    *time_us = seconds * US_PER_S + fraction;
-    return NULL;
-}
-
-static int hexadecimal(char digit) {
-    const char *const digits = "0123456789abcdef", *found = strchr(digits, tolower((unsigned char)digit));
-    return digit == '\0' || found == NULL ? -1 : (int)(found - digits);
-}
-
-static const char *parse_identifier(const char **at, struct frame *frame) {
-    size_t digits = 0;
-    for (int digit = hexadecimal(**at); digit >= 0 && digits < EXTENDED_DIGITS; digit = hexadecimal(**at)) {
-        frame->identifier = frame->identifier << 4 | (uint32_t)digit;
-        digits++;
-        (*at)++;
-    }
-    frame->standard = digits == STANDARD_DIGITS;
-    if ((digits != STANDARD_DIGITS && digits != EXTENDED_DIGITS) || *(*at)++ != '#') {
-        return "no identifier of 3 or 8 hexadecimal digits and '#'";
-    }
-    return frame->standard && frame->identifier > 0x7FFu ? "an identifier over 7FF" : NULL;
-}
-
-static const char *parse_data(const char **at, size_t bytes_most, struct frame *frame) {
-    while (hexadecimal(**at) >= 0) {
-        const int high = hexadecimal((*at)[0]), low = hexadecimal((*at)[1]);
-        if (high < 0 || low < 0) {
-            return "half a byte of data";
-        }
-        if (frame->bytes == bytes_most) {
-            return "more data than a frame holds";
-        }
-        frame->data[frame->bytes++] = (uint8_t)(16 * high + low);
-        *at += 2;
-    }
-    return NULL;
-}
-
-static const char *parse_line(const char *line, struct frame *frame) {
-    const char *at = line;
-    memset(frame, 0, sizeof *frame);
-    const char *wrong = parse_time(&at, &frame->time_us);
-    if (wrong != NULL) {
-        return wrong;
-    }
-    const size_t interface = strcspn(at, " ");
-    if (interface == 0 || at[interface] == '\0') {
-        return "no interface and frame after the time";
-    }
-    at += interface + 1;
-    wrong = parse_identifier(&at, frame);
-    if (wrong != NULL) {
-        return wrong;
-    }
-    if (*at == 'R') {
-        frame->remote = true;
-        return NULL;
-    }
-    const bool fd = *at == '#';
-    if (fd && hexadecimal(at[1]) < 0) {
-        return "no flags after '##'";
-    }
-    at += fd ? 2 : 0;
-    wrong = parse_data(&at, fd ? FD_BYTES_MAX : CLASSIC_BYTES_MAX, frame);
-    if (wrong == NULL && *at != '\0' && *at != ' ' && *at != '_') { /* ' ' direction, '_' raw length code */
-        wrong = "a character that is no hexadecimal digit in its data";
-    }
-    return wrong;
-}
-
 /* --- the file --- */
 
-static bool take(struct candump *dump, const struct frame *frame) {
-    struct event_value values[CAN_FIELDS_MAX];
-    enum can_message message;
+/* TELEMETRY says the last tip sample again until there is a new one. */
+static bool is_told_again(struct candump *dump, enum message_id id, const union message *message) {
+    if (id != MESSAGE_TELEMETRY) {
+        return false;
+    }
+    const bool again = dump->tip_known && message->telemetry.tip_measured == dump->tip_measured;
+    dump->tip_known = true;
+    dump->tip_measured = message->telemetry.tip_measured;
+    return again;
+}
+
+static bool take(struct candump *dump, const struct can_text *line) {
+    const struct hal_can_frame *frame = &line->frame;
+    struct event_value values[CAN_COLUMNS_MAX];
+    struct message_trouble trouble = {.out_of_range = 0u};
+    union message message;
+    enum message_id id = MESSAGE_COUNT;
     unsigned node = 0;
     dump->counts->frames++;
-    if (frame->remote || !frame->standard || !can_layout_find(frame->identifier, &message, &node)) {
+    if (line->remote || frame->extended || !can_layout_find(frame->id, &id, &node)) {
         dump->counts->other_message++;
         return true;
     }
@@ -134,22 +49,23 @@ static bool take(struct candump *dump, const struct frame *frame) {
         dump->counts->other_node++;
         return true;
     }
-    if (frame->bytes < can_layout_bytes(message)) {
+    if (frame->length < message_row(id)->bytes) {
         dump->counts->short_frames++;
         return true;
     }
     dump->counts->decoded++;
-    return event_rows_add(&dump->rows, frame->time_us, values,
-                          can_layout_decode(message, frame->data, values));
+    message_unpack(id, frame->data, &message, &trouble);
+    const bool tip = !is_told_again(dump, id, &message);
+    return event_rows_add(&dump->rows, line->time_us, values, can_layout_columns(id, &message, tip, values));
 }
 
 static bool take_line(struct candump *dump, char *line, int number) {
-    struct frame frame;
+    struct can_text frame;
     line[strcspn(line, "\r\n")] = '\0';
     if (*line == '\0') {
         return true;
     }
-    const char *wrong = parse_line(line, &frame);
+    const char *wrong = can_text_parse_log(line, &frame);
     if (wrong == NULL) {
         return take(dump, &frame);
     }

@@ -121,25 +121,53 @@ static void a_valve_that_is_known_to_be_late_does_not_make_the_pressure_swing(vo
     assert_under(late.wander_pa, 0.7 * unknown.wander_pa);
 }
 
-static void a_late_valve_that_is_cut_stays_shut(void **state) {
-    (void)state;
+static void cut_a_late_valve(int64_t from_us) {
     struct pressure_loop_parameters parameters;
     struct pressure_loop loop;
     pressure_loop_default_parameters(&parameters);
     parameters.late_us = 60000;
     pressure_loop_init(&loop);
-    for (int64_t time_us = 1000; time_us <= 100000; time_us += 1000) {
-        pressure_loop_predict(&loop, &parameters, 40000.0f, 2e-4f, time_us, 1000);
-        (void)pressure_loop_duty(&loop, &parameters, 8000.0f, 40000.0f, 2e-4f, time_us);
+    struct pressure_loop_clock clock = {.now_us = 0};
+    for (int64_t time_us = from_us + 1000; time_us <= from_us + 100000; time_us += 1000) {
+        clock = pressure_loop_clock_at(time_us, parameters.pwm_period_us, 1000);
+        pressure_loop_predict(&loop, &parameters, 40000.0f, 2e-4f, &clock);
+        (void)pressure_loop_duty(&loop, &parameters, 8000.0f, 40000.0f, 2e-4f, &clock);
     }
     assert_true(loop.estimate_pa > 0.0f);
-    pressure_loop_vent(&loop, &parameters, 100000);
+    pressure_loop_vent(&loop, &parameters, &clock);
     const float at_cut_pa = loop.estimate_pa;
-    for (int64_t time_us = 101000; time_us <= 300000; time_us += 1000) {
-        pressure_loop_predict(&loop, &parameters, 40000.0f, 2e-4f, time_us, 1000);
+    for (int64_t time_us = from_us + 101000; time_us <= from_us + 300000; time_us += 1000) {
+        clock = pressure_loop_clock_at(time_us, parameters.pwm_period_us, 1000);
+        pressure_loop_predict(&loop, &parameters, 40000.0f, 2e-4f, &clock);
         assert_true(loop.estimate_pa <= at_cut_pa + 20.0f); /* what a close delay of 1 ms still lets in */
     }
     assert_true(loop.estimate_pa < 0.9f * at_cut_pa);
+}
+
+static void a_late_valve_that_is_cut_stays_shut(void **state) {
+    (void)state;
+    cut_a_late_valve(0);
+}
+
+/* The loop's 32-bit times wrap 71.6 minutes after the start, and look half a wrap away at 35.8. */
+static void pulses_cross_the_wrap_of_their_clock(void **state) {
+    (void)state;
+    cut_a_late_valve(2147483648 - 648 - 60000);
+    cut_a_late_valve(4294967296 - 7296 - 60000);
+}
+
+static void a_valve_shut_for_hours_still_counts_as_vented(void **state) {
+    (void)state;
+    struct pressure_loop_parameters parameters;
+    struct pressure_loop loop;
+    pressure_loop_default_parameters(&parameters);
+    pressure_loop_init(&loop);
+    for (int64_t time_us = 1000000; time_us < 20000000000; time_us += 1000000) {
+        const struct pressure_loop_clock clock = pressure_loop_clock_at(time_us, parameters.pwm_period_us, 1000);
+        pressure_loop_predict(&loop, &parameters, 40000.0f, 2e-4f, &clock);
+        assert_true(pressure_loop_vented_us(&loop, &clock) >= 1000000);
+        assert_true(loop.estimate_pa <= 0.0f);
+    }
 }
 
 static void a_known_dead_band_is_stepped_over(void **state) {
@@ -193,6 +221,8 @@ int main(void) {
         cmocka_unit_test(a_reading_that_the_sensor_clips_only_bounds_the_pressure),
         cmocka_unit_test(a_valve_that_is_known_to_be_late_does_not_make_the_pressure_swing),
         cmocka_unit_test(a_late_valve_that_is_cut_stays_shut),
+        cmocka_unit_test(pulses_cross_the_wrap_of_their_clock),
+        cmocka_unit_test(a_valve_shut_for_hours_still_counts_as_vented),
         cmocka_unit_test(a_known_dead_band_is_stepped_over),
         cmocka_unit_test(a_known_creep_is_foreseen_without_a_tip_sensor),
     };

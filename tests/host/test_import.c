@@ -837,21 +837,22 @@ static void a_candump_becomes_a_run_log(void **state) {
     struct candump_counts counts;
     struct run_log log;
     char error[ERROR_BYTES];
-    /* node 3: 1000 Pa = 250 = FA00 in little-endian; -100 Pa = -25 = E7FF */
-    write_text(source_path, "(1700000000.000100) can0 103#FA00E7FF00001027\n"
-                            "(1700000000.000400) can0 113#F40100000000\n"
-                            "(1700000000.000700) can0 123#8813000010270300\n"
-                            "(1700000000.001000) can0 133##1F0D800001819610000000000\n"
-                            "(1700000000.001300) can0 143#FF7F000000000180 T\n"
-                            "(1700000000.001400) can0 104#0000000000000000\n"
+    /* node 3: 1000 Pa = 500 = F401 in little-endian; -100 Pa = -50 = CEFF; no reading is 0080 */
+    write_text(source_path, "(1700000000.000100) can0 113#F401CEFF00800000\n"
+                            "(1700000000.000400) can0 123#D007000000000000\n"
+                            "(1700000000.000700) can0 143#8813000071823801\n"
+                            "(1700000000.000900) can0 103#1300000000000000\n"
+                            "(1700000000.001000) can0 153#F0D8000018190000\n"
+                            "(1700000000.001300) can0 163#FF7F000000000180 T\n"
+                            "(1700000000.001400) can0 114#0000000000000000\n"
                             "(1700000000.001500) can0 18FF0001#00\n"
-                            "(1700000000.001600) can0 103#R\n"
-                            "(1700000000.001700) can0 103#FA00\n"
+                            "(1700000000.001600) can0 113#R\n"
+                            "(1700000000.001700) can0 113#FA00\n"
                             "\n"
-                            "(1700000000.001800) can0 103#0000000000000000\n");
+                            "(1700000000.001800) can0 113#0000000000000000\n");
     assert_true(candump_read(source_path, CANDUMP_FIRST_NODE, &log, &counts, error, sizeof error));
-    assert_int_equal(counts.frames, 10);
-    assert_int_equal(counts.decoded, 6);
+    assert_int_equal(counts.frames, 11);
+    assert_int_equal(counts.decoded, 7);
     assert_int_equal(counts.other_node, 1);
     assert_int_equal(counts.other_message, 2);
     assert_int_equal(counts.short_frames, 1);
@@ -859,6 +860,7 @@ static void a_candump_becomes_a_run_log(void **state) {
     assert_int_equal(log.rows, 2); /* one step's messages share a row until one comes again */
     assert_close(field(&log, 0, "p1_pa"), 1000.0, 0.0);
     assert_close(field(&log, 0, "p2_pa"), -100.0, 0.0);
+    assert_true(isnan(field(&log, 0, "p3_pa")));
     assert_close(field(&log, 0, "supply_pa"), 40000.0, 0.0);
     assert_close(field(&log, 0, "p1_cmd_pa"), 2000.0, 0.0);
     assert_close(field(&log, 0, "valve1"), 0.5, 1e-12);
@@ -866,15 +868,14 @@ static void a_candump_becomes_a_run_log(void **state) {
     assert_close(field(&log, 0, "state"), SUPERVISOR_ACTIVE, 0.0);
     assert_close(field(&log, 0, "tip_x_m"), -0.1, 1e-12); /* 0xD8F0 = -10000 */
     assert_close(field(&log, 0, "tip_z_m"), 0.06424, 1e-9);
-    assert_close(field(&log, 0, "tip_quality"), 97.0, 0.0);
-    assert_close(field(&log, 0, "tip_qw"), 1.0, 1e-12);
-    assert_close(field(&log, 0, "tip_qz"), -1.0, 1e-12);
+    assert_close(field(&log, 0, "tip_qw"), 1.0, 1e-7);
+    assert_close(field(&log, 0, "tip_qz"), -1.0, 1e-7);
     assert_close(field(&log, 1, "time_s"), 0.0017, 1e-9);
     assert_true(isnan(field(&log, 1, "tip_qw")));
     run_log_free(&log);
     assert_false(candump_read(source_path, 4, &log, &counts, error, sizeof error)); /* it spoke once */
-    assert_int_equal(counts.other_node, 7);
-    assert_names(error, "7 of other nodes");
+    assert_int_equal(counts.other_node, 8);
+    assert_names(error, "8 of other nodes");
 }
 
 static void malformed_candump_lines_are_counted_and_the_first_is_named(void **state) {
@@ -896,7 +897,7 @@ static void malformed_candump_lines_are_counted_and_the_first_is_named(void **st
     char error[ERROR_BYTES], text[256];
     for (size_t i = 0; i < sizeof bad / sizeof bad[0]; i++) {
         (void)snprintf(text, sizeof text,
-                       "(1.000000) can0 100#0000000000000000\n%s\n(1.100000) can0 100#0000000000000000\n",
+                       "(1.000000) can0 111#0000000000000000\n%s\n(1.100000) can0 111#0000000000000000\n",
                        bad[i]);
         write_text(source_path, text);
         assert_true(candump_read(source_path, CANDUMP_FIRST_NODE, &log, &counts, error, sizeof error));
@@ -911,26 +912,65 @@ static void malformed_candump_lines_are_counted_and_the_first_is_named(void **st
     }
 }
 
-static void can_messages_do_not_overlap(void **state) {
+/* FD telemetry says the last tip sample again until there is a new one: only that is a sample. */
+static void fd_telemetry_becomes_rows_with_each_tip_sample_once(void **state) {
     (void)state;
-    for (int m = 0; m < (int)CAN_MESSAGE_COUNT; m++) {
-        uint8_t data[8];
-        struct event_value values[CAN_FIELDS_MAX];
-        memset(data, 0, sizeof data);
-        double sum_before = 0.0;
-        for (size_t bit = 0; bit < 8 * can_layout_bytes((enum can_message)m); bit++) {
-            data[bit / 8] = (uint8_t)(1u << (bit % 8));
-            const size_t count = can_layout_decode((enum can_message)m, data, values);
-            size_t touched = 0;
-            for (size_t v = 0; v < count; v++) {
-                touched += fabs(values[v].value) > 0.0;
-                sum_before += fabs(values[v].value);
-            }
-            assert_int_equal(touched, 1); /* every bit belongs to one field */
-            data[bit / 8] = 0;
+    struct candump_counts counts;
+    struct run_log log;
+    char error[ERROR_BYTES], text[2048] = "";
+    for (int i = 0; i < 6; i++) {
+        const struct message_telemetry telemetry = {.pressure_1 = 100.0f * (float)i,
+                                                    .pressure_2 = NAN,
+                                                    .duty_2 = 0.25f,
+                                                    .tip_x = 0.01f,
+                                                    .tip_qw = 1.0f,
+                                                    .tip_measured = (uint16_t)(i / 2 * 156),
+                                                    .state = SUPERVISOR_ACTIVE};
+        struct message_trouble trouble = {0};
+        struct hal_can_frame frame;
+        message_frame(MESSAGE_TELEMETRY, 2u, &telemetry, &frame, &trouble);
+        size_t at = strlen(text);
+        (void)snprintf(text + at, sizeof text - at, "(1700000000.%06d) can0 %03X##1", 5000 * i, frame.id);
+        for (size_t b = 0; b < 64; b++) {
+            at = strlen(text);
+            (void)snprintf(text + at, sizeof text - at, "%02X%s", frame.data[b], b == 63 ? "\n" : "");
         }
-        assert_true(sum_before > 0.0);
     }
+    write_text(source_path, text);
+    assert_true(candump_read(source_path, CANDUMP_FIRST_NODE, &log, &counts, error, sizeof error));
+    assert_int_equal(log.rows, 6);
+    for (size_t row = 0; row < 6; row++) {
+        assert_close(field(&log, row, "p1_pa"), 100.0 * (double)row, 0.0);
+        assert_close(field(&log, row, "valve2"), 0.25, 1e-9);
+        assert_close(field(&log, row, "time_s"), 0.005 * (double)row, 1e-9);
+        assert_int_equal(isnan(field(&log, row, "tip_x_m")), row % 2 == 1);
+        assert_int_equal(isnan(field(&log, row, "tip_qw")), row % 2 == 1);
+    }
+    run_log_free(&log);
+}
+
+/* Each column that a message carries is one of a run log's, and each row of the layout names a field. */
+static void every_can_column_is_a_column_of_a_run_log(void **state) {
+    (void)state;
+    size_t columns = 0;
+    for (uint32_t number = 0; number < 128u; number++) {
+        enum message_id id;
+        unsigned node = 0;
+        if (!can_layout_find(number * 16u + 5u, &id, &node)) {
+            continue;
+        }
+        union message message;
+        struct event_value values[CAN_COLUMNS_MAX];
+        memset(&message, 0, sizeof message);
+        assert_int_equal(node, 5);
+        const size_t count = can_layout_columns(id, &message, true, values);
+        for (size_t v = 0; v < count; v++) {
+            enum run_dimension dimension;
+            assert_true(run_column_find(values[v].column, &dimension));
+        }
+        columns += count;
+    }
+    assert_int_equal(columns, 37); /* the rows of can_layout.c */
 }
 
 int main(void) {
@@ -958,7 +998,8 @@ int main(void) {
         cmocka_unit_test(what_is_no_lcm_log_of_ours_is_refused),
         cmocka_unit_test(a_candump_becomes_a_run_log),
         cmocka_unit_test(malformed_candump_lines_are_counted_and_the_first_is_named),
-        cmocka_unit_test(can_messages_do_not_overlap),
+        cmocka_unit_test(fd_telemetry_becomes_rows_with_each_tip_sample_once),
+        cmocka_unit_test(every_can_column_is_a_column_of_a_run_log),
     };
     return cmocka_run_group_tests(tests, set_up, tear_down);
 }

@@ -1,5 +1,6 @@
 #include "support/sim_storage.h"
 
+#include <stddef.h>
 #include <string.h>
 
 static uint8_t *area_of(struct sim_storage *storage, enum hal_storage_area area, uint32_t *bytes) {
@@ -94,9 +95,10 @@ void sim_storage_power_up(struct sim_storage *storage) {
 }
 
 void sim_storage_init(struct sim_storage *storage, uint32_t table_bytes) {
-    memset(storage, 0, sizeof *storage);
+    memset(storage, 0, offsetof(struct sim_storage, parameters));
     memset(storage->parameters, 0xff, sizeof storage->parameters);
-    memset(storage->table, 0xff, sizeof storage->table);
+    memset(storage->table[0], 0xff, table_bytes);
+    memset(storage->table[1], 0xff, table_bytes);
     storage->table_bytes = table_bytes;
     storage->random = 1u;
     storage->hal = (struct hal_storage){.context = storage,

@@ -14,7 +14,7 @@ HIL_PACKAGES := user-mode-linux can-utils kmod iproute2
 # npm brings the page's plotting library. Who has npm from elsewhere keeps it: Debian's would not go beside it.
 VIEW_PACKAGES := libmicrohttpd-dev $(if $(shell command -v npm),,npm)
 # what `make test` alone needs
-TEST_PACKAGES  := chromium curl mandoc man-db bsdextrautils systemd librsvg2-bin
+TEST_PACKAGES  := chromium curl mandoc man-db bsdextrautils systemd librsvg2-bin clang python3-canmatrix
 LINT_PACKAGES  := clang clang-tidy cppcheck
 
 # --- sources: a folder is a layer; arrows between layers are include paths below
@@ -36,9 +36,11 @@ TEST_C     := $(wildcard tests/*/test_*.c)
 BENCH_C    := $(wildcard tests/bench/bench_*.c)
 CAMPAIGN_MAIN := tests/campaign/campaign_main.c
 FAULTS_PAGE_C := tests/docs/faults_page.c
-SUPPORT_C  := $(filter-out $(TEST_C) $(BENCH_C) $(FAULTS_PAGE_C) tests/campaign/%,$(wildcard tests/*/*.c))
+FUZZ_C     := $(wildcard tests/fuzz/*.c)
+SUPPORT_C  := $(filter-out $(TEST_C) $(BENCH_C) $(FAULTS_PAGE_C) tests/campaign/% $(FUZZ_C),$(wildcard tests/*/*.c))
 CAMPAIGN_C := $(filter-out $(TEST_C) $(CAMPAIGN_MAIN),$(wildcard tests/campaign/*.c))
 SOLID_C    := $(wildcard tests/model/ccx/*.c)
+INSTRUCTIONS_C := $(wildcard tests/bench/instructions/*.c)
 BLIND_SCORE_C := $(wildcard tests/gap/blind/blind_score*.c)
 SHARE_C := $(wildcard tests/gap/share/*.c)
 UML_C := $(wildcard tests/hil/uml/*.c)
@@ -47,8 +49,8 @@ STUB_C := $(wildcard tests/link/stub/*.c)
 STUB := $(BUILD)/tests/link/stub/board_stub
 BLIND_MAIN := tests/gap/blind/blind_generate.c
 BLIND_C    := $(filter-out $(BLIND_SCORE_C) $(BLIND_MAIN),$(wildcard tests/gap/blind/blind_*.c))
-ALL_C      := $(wildcard docs/examples/*.c) $(FIRMWARE_C) $(SIM_C) $(EMULATOR_C) $(MODEL_C) $(TABLES_CLI_C) $(HOST_C) $(HOST_MAIN) $(EMULATED_C) $(MANUAL_C) $(TEST_C) $(BENCH_C) $(SUPPORT_C) $(CAMPAIGN_C) $(CAMPAIGN_MAIN) $(FAULTS_PAGE_C) $(SOLID_C) $(BLIND_C) $(BLIND_MAIN) $(BLIND_SCORE_C) $(SHARE_C) $(STUB_C) $(UML_C) $(BOARD_C)
-ALL_H      := $(wildcard tests/gap/blind/*.h tests/model/ccx/*.h firmware/*.h firmware/*/*.h hal/*.h hal/*/*.h model/*/*.h host/*/*.h tests/*/*.h)
+ALL_C      := $(wildcard docs/examples/*.c) $(FIRMWARE_C) $(SIM_C) $(EMULATOR_C) $(MODEL_C) $(TABLES_CLI_C) $(HOST_C) $(HOST_MAIN) $(EMULATED_C) $(MANUAL_C) $(TEST_C) $(BENCH_C) $(SUPPORT_C) $(CAMPAIGN_C) $(CAMPAIGN_MAIN) $(FAULTS_PAGE_C) $(SOLID_C) $(BLIND_C) $(BLIND_MAIN) $(BLIND_SCORE_C) $(SHARE_C) $(INSTRUCTIONS_C) $(STUB_C) $(UML_C) $(BOARD_C)
+ALL_H      := $(wildcard tests/gap/blind/*.h tests/bench/instructions/*.h tests/model/ccx/*.h firmware/*.h firmware/*/*.h hal/*.h hal/*/*.h model/*/*.h host/*/*.h tests/*/*.h)
 
 # --- flags
 WARNINGS := -Wall -Wextra -Wpedantic -Wconversion -Wsign-conversion -Wshadow -Werror
@@ -166,6 +168,11 @@ $(MANUAL): %.bash: %.generate
 	@$< $(@D)
 -include $(wildcard $(BUILD)/manual/*/*.d)
 
+# The firmware's pure part for an emulated core that counts instructions, by the board's own objects.
+INSTRUCTIONS_O   := $(call object,$(filter-out %/image.c,$(INSTRUCTIONS_C)))
+INSTRUCTIONS_ELF := $(BUILD)/tests/bench/instructions/image.elf
+INSTRUCTIONS_IMAGE_O = $(patsubst %.c,$(BOARD)/%.o,$(FIRMWARE_C) tests/bench/instructions/image.c tests/bench/instructions/frame_app.c)
+
 .PHONY: test-programs bench-programs
 test-programs: $(TEST_PROGRAMS) $(MANUAL) $(BLIND_PROGRAMS) $(BUILD)/tests/campaign/campaign $(BUILD)/tests/docs/faults_page $(STUB) $(BUILD)/tests/hil/uml/mission $(SELFTEST_ELF)
 bench-programs: $(BENCH_PROGRAMS)
@@ -195,6 +202,7 @@ $(BUILD)/tests/campaign/test_campaign: $(call object,$(CAMPAIGN_C))
 $(BUILD)/tests/campaign/campaign: $(call object,$(CAMPAIGN_MAIN) $(CAMPAIGN_C)) $(HOST_O) $(SIM_O) $(FIRMWARE_O) $(SHARED_O)
 	$(link) $(HOST_LIBS)
 $(BUILD)/tests/gap/test_blind_plant: $(call object,$(filter-out %/blind_truth.c,$(BLIND_C)))
+$(BUILD)/tests/bench/test_instructions $(BUILD)/tests/bench/bench_instructions: $(INSTRUCTIONS_O) | $(INSTRUCTIONS_ELF)
 $(BUILD)/tests/board/test_conversions $(BUILD)/tests/board/test_port $(BUILD)/tests/hil/test_replay: $(call object,$(PORT_PURE_C))
 $(BUILD)/tests/%: $(BUILD)/tests/%.o $(SUPPORT_O) $(HOST_O) $(EMULATOR_O) $(SIM_O) $(FIRMWARE_O) $(SHARED_O)
 	$(link) -lcmocka $(EMULATOR_LIBS)
@@ -216,6 +224,10 @@ ARM_CORE   := -mcpu=cortex-m4 -mthumb -mfloat-abi=hard -mfpu=fpv4-sp-d16
 BOARD_FLAGS := $(ARM_CORE) -O2 -g -ffunction-sections -fdata-sections -fstack-usage
 BOARD_LINK := $(ARM_CORE) --specs=nano.specs -nostartfiles -T hal/stm32g4/stm32g474.ld -Wl,--gc-sections -Wl,--fatal-warnings
 ELF        := $(BUILD)/firmware/tribend.elf
+$(INSTRUCTIONS_ELF): $(INSTRUCTIONS_IMAGE_O) tests/bench/instructions/image.ld
+	@mkdir -p $(@D)
+	$(if $(V),,@echo '  link $@';) $(BOARD_CC) $(ARM_CORE) --specs=nano.specs -nostartfiles -T tests/bench/instructions/image.ld \
+	    -Wl,--gc-sections -Wl,--fatal-warnings $(filter %.o,$^) -o $@
 
 $(BOARD)/%.o: %.c
 	@mkdir -p $(@D)
@@ -235,7 +247,22 @@ $(ELF:.elf=.stack): $(ELF) tests/tools/stack_usage hal/stm32g4/indirect_calls
 	@tests/tools/stack_usage $< $(BOARD) hal/stm32g4/indirect_calls >$@
 .PHONY: firmware-files
 firmware-files: $(ELF) $(ELF:.elf=.stack) $(ELF:.elf=.hex) $(ELF:.elf=.bin)
--include $(patsubst %.c,$(BOARD)/%.d,$(FIRMWARE_C) $(BOARD_C))
+-include $(patsubst %.c,$(BOARD)/%.d,$(FIRMWARE_C) $(BOARD_C) tests/bench/instructions/image.c tests/bench/instructions/frame_app.c)
+
+# --- fuzz targets: libFuzzer comes with clang alone
+FUZZ_FLAGS := -O2 -g -fno-omit-frame-pointer -fsanitize=address,undefined -fno-sanitize-recover=all
+FUZZ_O     := $(patsubst %.c,$(BUILD)/fuzz/%.o,$(FIRMWARE_C) tests/support/sim_storage.c tests/support/tiny_table.c)
+FUZZ_PROGRAMS := $(patsubst tests/fuzz/%.c,$(BUILD)/fuzz/%,$(filter-out tests/fuzz/seeds.c,$(FUZZ_C)))
+.PHONY: fuzz-programs
+fuzz-programs: $(FUZZ_PROGRAMS) $(BUILD)/fuzz/seeds
+$(BUILD)/fuzz/%.o: %.c
+	@mkdir -p $(@D)
+	$(say)clang $(FUZZ_FLAGS) -fsanitize=fuzzer-no-link $(COMMON_FLAGS) -MMD -MP -c $< -o $@
+$(FUZZ_PROGRAMS): $(BUILD)/fuzz/%: $(BUILD)/fuzz/tests/fuzz/%.o $(FUZZ_O)
+	$(if $(V),,@echo '  link $@';) clang $(FUZZ_FLAGS) -fsanitize=fuzzer $(filter %.o,$^) -o $@ -lm
+$(BUILD)/fuzz/seeds: $(BUILD)/fuzz/tests/fuzz/seeds.o $(FUZZ_O)
+	$(if $(V),,@echo '  link $@';) clang $(FUZZ_FLAGS) $(filter %.o,$^) -o $@ -lm
+-include $(wildcard $(BUILD)/fuzz/*/*.d $(BUILD)/fuzz/*/*/*.d)
 
 # --- lint: every compiler that the firmware must build with, then the analysers
 ARM_FLAGS := $(ARM_CORE) -Os
