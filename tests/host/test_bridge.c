@@ -32,6 +32,7 @@ static struct {
     uint8_t data[BRIDGE_CHANNEL_COUNT][BRIDGE_MESSAGE_BYTES];
     uint32_t bytes[BRIDGE_CHANNEL_COUNT];
     int64_t board_us;
+    struct message_status status; /* as the board says it with every report */
 } world;
 
 static bool note_message(void *context, enum bridge_channel channel, const void *data, uint32_t bytes) {
@@ -58,6 +59,7 @@ static int set_up(void **state) {
     memset(&world, 0, sizeof world);
     world.now = (struct bridge_now){START_HOST_US, 1000000};
     world.board_us = START_BOARD_US;
+    world.status = (struct message_status){.state = SUPERVISOR_SAFE, .protocol = MESSAGE_PROTOCOL};
     bridge_init(&world.bridge, NODE, &out, &world.now);
     return 0;
 }
@@ -80,11 +82,12 @@ static uint16_t step(void) {
     return (uint16_t)(world.board_us / 1000);
 }
 
-/* TIME and a report of now. */
+/* TIME, STATUS and a report of now. */
 static void board_reports(int64_t late_us) {
     const struct message_time time = {.time_us = (uint64_t)world.board_us, .step = step()};
     const struct message_pressures pressures = {1000.0f, 2000.0f, NAN, step()};
     board_says(MESSAGE_TIME, &time, late_us);
+    board_says(MESSAGE_STATUS, &world.status, late_us);
     board_says(MESSAGE_PRESSURES, &pressures, late_us);
 }
 
@@ -265,7 +268,7 @@ static void a_report_becomes_a_status(void **state) {
         .state = SUPERVISOR_FAULT, .protocol = MESSAGE_PROTOCOL, .faults = 0x80000004u};
     tribend_status_t out;
     board_says(MESSAGE_BEND, &bend, 0);
-    board_says(MESSAGE_STATUS, &status, 0);
+    world.status = status;
     board_reports(0);
     assert_true(tribend_status_t_decode(world.data[BRIDGE_CHANNEL_STATUS], 0,
                                         (int)world.bytes[BRIDGE_CHANNEL_STATUS], &out) > 0);
