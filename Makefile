@@ -7,6 +7,7 @@
 
 SANITIZE ?= 0
 BUILD    ?= $(if $(filter 1,$(SANITIZE)),build-sanitize,build)
+PREFIX   ?= /usr/local
 CC       := $(if $(filter default,$(origin CC)),gcc,$(CC))
 SHELL    := /bin/bash
 .DEFAULT_GOAL := help
@@ -14,7 +15,7 @@ SHELL    := /bin/bash
 MAKEFLAGS += --no-builtin-rules
 include tests/tools/build.mk
 
-.PHONY: help setup all demo test bench gap-check firmware flash misra hil campaign docs-faults lint format tables clean
+.PHONY: help setup all demo test bench gap-check firmware flash misra hil campaign docs docs-faults lint format tables install uninstall clean
 
 help: ## list these targets
 	@grep -hE '^[a-z-]+:.*## ' Makefile | awk -F ':.*## ' '{printf "  make %-10s %s\n", $$1, $$2}'
@@ -62,6 +63,10 @@ campaign: setup ## break the simulated board in every way, alone and in pairs (M
 	@$(BUILD)/tests/campaign/campaign $(if $(MISSIONS),-n $(MISSIONS)) $(if $(SEED),-s $(SEED)) $(if $(FAULT),-f '$(FAULT)') \
 	    -o $(if $(CSV),$(CSV),$(BUILD)/campaign.csv)
 
+docs: all ## check the documentation: links, subcommands, headers, drawings, the commands of its pages
+	@tests/tools/setup $(TEST_PACKAGES)
+	@TRIBEND_BUILD=$(BUILD) bash tests/docs/test_docs.sh
+
 docs-faults: $(BUILD)/tests/docs/faults_page ## write docs/faults.md from firmware/safety/faults.def
 	@$(BUILD)/tests/docs/faults_page >docs/faults.md
 
@@ -74,6 +79,12 @@ format: ## clang-format every C file
 
 tables: $(BUILD)/tribend-tables ## rebuild the reference table tables/paper-semicircle.tbt from its module and material
 	$(BUILD)/tribend-tables build tables/modules/paper-semicircle.yaml -o tables/paper-semicircle.tbt
+
+install: all firmware-files ## install below PREFIX (default /usr/local), staged below DESTDIR
+	@tests/tools/install_tree install $(BUILD) $(VERSION) '$(DESTDIR)' '$(PREFIX)'
+
+uninstall: ## take away what `make install` put there
+	@tests/tools/install_tree uninstall '$(DESTDIR)' '$(PREFIX)'
 
 clean: ## remove what was built
 	rm -rf build build-sanitize $(BUILD)

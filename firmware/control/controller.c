@@ -198,11 +198,13 @@ static float highest_pressure(const struct controller *controller) {
 }
 
 static void watch_bend(struct controller *controller, const struct controller_input *input) {
+    const struct pressure_loop *loop = controller->pressure_loop;
     const struct tip_watch_view view = {.time_us = input->time_us,
                                         .measured_rad = controller->tip_loop.measured_rad,
                                         .gap_rad = controller->tip_loop.gap_rad,
+                                        .push_radppa = (const float(*)[2])controller->gap_monitor.push_radppa,
                                         .slope_radppa = controller->gap_monitor.slope_radppa,
-                                        .highest_pa = highest_pressure(controller),
+                                        .pressure_pa = {loop[0].estimate_pa, loop[1].estimate_pa, loop[2].estimate_pa},
                                         .working_pa = controller->parameters.limits.working_pressure_pa};
     tip_watch_follow(&controller->tip_watch, &controller->parameters.tip_watch, &view, controller->tip_loop.correction_rad);
 }
@@ -336,6 +338,15 @@ static uint32_t find_board_faults(struct controller *controller, const struct co
     return faults;
 }
 
+/* A chamber takes more air than its reading explains, and there is no tip sensor that vouches for the reading. */
+static bool is_doubted(const struct controller *controller) {
+    bool doubted = false;
+    for (uint32_t c = 0; c < 3u; c++) {
+        doubted = doubted || flow_watch_doubts(&controller->flow_watch[c], &controller->parameters.flow_watch);
+    }
+    return doubted && controller->tip_lost && controller->table != NULL;
+}
+
 /* Whether a sensor is broken shows in what it `shows` itself, whether a chamber bursts in the pressure behind that. */
 static uint32_t find_faults(struct controller *controller, const struct controller_input *input,
                             const struct controller_input *shows) {
@@ -349,6 +360,9 @@ static uint32_t find_faults(struct controller *controller, const struct controll
     }
     if (limits_check_working(&controller->limits, limits, highest_pa)) {
         faults |= 1u << FAULT_OVERPRESSURE;
+    }
+    if (is_doubted(controller)) {
+        faults |= 1u << FAULT_SENSORS_DISAGREE;
     }
     if (tip_watch_disagrees(&controller->tip_watch, &controller->parameters.tip_watch, input->time_us)) {
         faults |= 1u << FAULT_SENSORS_DISAGREE;

@@ -22,15 +22,20 @@ struct flow_watch_parameters {
     float vents_above_pa; /* a chamber below may be a sensor's offset */
     float weak_share;     /* of either flow: what is beyond it */
     float weak_pa;        /* is a warning over this */
+    float steady_share;   /* of either flow, where pressure neither rises nor falls: what is missing beyond it */
+    float steady_pa;      /* over this may as well be a reading that has gone away */
+    float steady_from_pa; /* a chamber below does no harm */
 };
 
 struct flow_watch {
-    float net_pa;     /* change that the model has lately made in a step */
+    float net_pa;     /* change that the model has lately made in a step, */
+    float moved_pa;   /* and the measured pressure */
     float gained_pa;  /* though the valve should have vented */
     float kept_pa;    /* of what should have left */
     float missing_pa; /* of what should have come */
     float lost_pa;    /* air that went missing, either way, */
     float left_pa;    /* or stayed */
+    float steady_pa;  /* air that goes missing in a steady pressure */
 };
 
 /* One chamber in one control step. */
@@ -49,6 +54,9 @@ uint32_t flow_watch_step(struct flow_watch *watch, const struct flow_watch_param
                          const struct flow_watch_view *view);
 /* Of the last step: the chamber loses air, or keeps it. */
 bool flow_watch_loses(const struct flow_watch *watch, const struct flow_watch_parameters *parameters);
+/* More air goes in than the reading explains: a large leak, or a true pressure above the reading. Only another sensor can
+ * tell which. */
+bool flow_watch_doubts(const struct flow_watch *watch, const struct flow_watch_parameters *parameters);
 bool flow_watch_keeps(const struct flow_watch *watch, const struct flow_watch_parameters *parameters);
 
 #endif

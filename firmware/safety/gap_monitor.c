@@ -182,6 +182,8 @@ static void follow_bend(struct gap_monitor *monitor, const struct gap_monitor_pa
     (void)bend_table_gradient(table, stencil, BEND_TABLE_CURVATURE_Y, y);
     for (uint32_t c = 0; c < 3u; c++) {
         monitor->slope_radppa[c] = length_m * real_hypot(x[c], y[c]);
+        monitor->push_radppa[c][0] = length_m * x[c];
+        monitor->push_radppa[c][1] = length_m * y[c];
         slope_squared += monitor->slope_radppa[c] * monitor->slope_radppa[c];
         lag_rad[0] += length_m * x[c] * lag_pa[c];
         lag_rad[1] += length_m * y[c] * lag_pa[c];

@@ -79,7 +79,8 @@ struct gap_monitor {
     float moved_pa[3];          /* change of the estimate, gathered like the gap */
     float lag_pa[3];            /* readings minus estimates, summed since the last pose */
     uint32_t steps;             /* since the last pose */
-    float slope_radppa[3];      /* size of the bend vector's slope by each pressure */
+    float slope_radppa[3];      /* size of the bend vector's slope by each pressure, */
+    float push_radppa[3][2];    /* and that slope itself */
     float bend_gap_rad[2];
     float across_m[3];          /* position off the chord, base frame */
     float length_m;             /* measured minus undeformed, when last at rest */

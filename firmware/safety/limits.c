@@ -19,7 +19,7 @@ void limits_default_parameters(struct limits_parameters *parameters, const struc
         .sensor_least_pa = -2500.0f,
         .sensor_most_pa = 49900.0f,  /* of a range that ends at 50 kPa: a broken wire reads full scale */
         .table_bytes_per_step = 64u, /* eight instructions a byte */
-        .parameter_bytes_per_step = 16u,
+        .parameter_bytes_per_step = 8u,
     };
 }
 

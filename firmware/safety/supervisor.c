@@ -129,7 +129,7 @@ const struct supervisor_fault_row *supervisor_fault_describe(enum supervisor_fau
 
 const char *supervisor_warning_text(enum supervisor_warning warning) {
     static const char *const texts[WARNING_COUNT] = {
-#define WARNING(NAME, title, sees, detector, limit, time, reaction, remedy, why) [WARNING_##NAME] = title,
+#define WARNING(NAME, title, sees, detector, limit, time, reaction, remedy, why) [WARNING_##NAME] = (title),
 #include "safety/faults.def"
     };
     return (uint32_t)warning < (uint32_t)WARNING_COUNT ? texts[warning] : "unknown";

@@ -6,7 +6,9 @@
 #define NORM_TOLERANCE 0.1f /* of a unit quaternion's square */
 #define STRETCH_MOST 2.0f   /* of the chamber's length; the reference module's greatest is 1.8 */
 #define AGE_MOST_US 100000  /* an older comparison says nothing of now */
-#define LEAST_SLOPE_RADPPA 3e-4f /* a straight module is stiff, but what bends it so far has made it soft: 17 deg/kPa */
+#define LEAST_SLOPE_RADPPA 1e-4f
+#define FLATTENS 1.6f /* beyond 90 degrees the slope falls: the true error is up to so much larger than by the slope here */
+#define PUSHES_FROM_PA 3000.0f /* a stiff chamber at low pressure bends the module too little to be judged by it */
 #define NEVER_US (-1000000000)
 
 void tip_watch_default_parameters(struct tip_watch_parameters *parameters) {
@@ -110,15 +112,21 @@ static void follow_frozen(struct tip_watch *watch, const struct tip_watch_parame
     }
 }
 
-/* The least error of one chamber's reading that explains the bend may put it over its limit. */
+/* The error of this chamber's reading that would push the tip to where it is puts the chamber over its limit. */
+static bool is_over(const struct tip_watch_parameters *parameters, const struct tip_watch_view *view, uint32_t c) {
+    const float slope_radppa = real_max(view->slope_radppa[c], LEAST_SLOPE_RADPPA);
+    const float pushed_rad =
+        (view->gap_rad[0] * view->push_radppa[c][0] + view->gap_rad[1] * view->push_radppa[c][1]) / slope_radppa;
+    return view->pressure_pa[c] > PUSHES_FROM_PA && pushed_rad > parameters->over_rad &&
+           view->pressure_pa[c] + FLATTENS * pushed_rad / slope_radppa > view->working_pa;
+}
+
 static bool exceeds(const struct tip_watch_parameters *parameters, const struct tip_watch_view *view) {
-    const float *measured = view->measured_rad, *gap = view->gap_rad, *slope = view->slope_radppa;
+    const float *measured = view->measured_rad, *gap = view->gap_rad;
     const float excess_rad =
         real_hypot(measured[0], measured[1]) - real_hypot(measured[0] - gap[0], measured[1] - gap[1]);
-    const float steepest_radppa = real_max(real_max(real_max(slope[0], slope[1]), slope[2]), LEAST_SLOPE_RADPPA);
-    return excess_rad > parameters->excess_rad ||
-           (excess_rad > parameters->over_rad &&
-            view->highest_pa + excess_rad / steepest_radppa > view->working_pa);
+    return excess_rad > parameters->excess_rad || is_over(parameters, view, 0u) || is_over(parameters, view, 1u) ||
+           is_over(parameters, view, 2u);
 }
 
 void tip_watch_follow(struct tip_watch *watch, const struct tip_watch_parameters *parameters,

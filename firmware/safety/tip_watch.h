@@ -58,9 +58,10 @@ struct tip_watch_view {
     int64_t time_us;
     const float *measured_rad; /* [2] bend vector */
     const float *gap_rad;      /* [2] measured minus the table's for the measured pressures */
-    const float *slope_radppa; /* [3] size of the table's bend by each pressure */
-    float highest_pa;          /* estimate of the fullest chamber */
-    float working_pa;          /* its limit */
+    const float (*push_radppa)[2]; /* [3] slope of the table's bend vector by each pressure, */
+    const float *slope_radppa;     /* [3] and its size */
+    float pressure_pa[3];          /* estimates */
+    float working_pa;              /* their limit */
 };
 
 /* `correction_rad` is the tip loop's; it goes back to that of before where the samples prove frozen. */

@@ -31,6 +31,8 @@ struct fdcan {
     uint32_t lost, filtered;
 };
 
+/* The peripheral of one board on one bus; then as after its reset, with another clock, and its registers. False: there is none
+ * at that offset. */
 void fdcan_init(struct fdcan *fdcan, struct core *core, struct can_bus *bus);
 void fdcan_reset(struct fdcan *fdcan, uint32_t clock_hz);
 void fdcan_clock(struct fdcan *fdcan, uint32_t clock_hz);

@@ -16,6 +16,7 @@ struct watchdog {
     uint32_t feeds;
 };
 
+/* Of one core; then as after its reset, and its registers. False: there is none at that offset. */
 void watchdog_init(struct watchdog *watchdog, struct core *core);
 void watchdog_reset(struct watchdog *watchdog);
 bool watchdog_read(void *context, uint32_t offset, uint32_t *value);

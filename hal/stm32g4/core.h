@@ -45,6 +45,7 @@ static inline void core_enable_interrupt(uint32_t number, uint8_t priority) {
     NVIC->iser[number / 32u] = 1u << (number % 32u);
 }
 
+/* Does not come back. */
 _Noreturn static inline void core_reset(void) {
     core_barrier();
     SCB->aircr = SCB_AIRCR_RESET;

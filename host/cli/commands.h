@@ -5,6 +5,7 @@
 #include <argp.h>
 
 #include "gap/calibration_use.h"
+#include "link/can_link.h"
 #include "link/sim_drill.h"
 #include "link/sim_link.h"
 #include "program/program.h"
@@ -13,6 +14,12 @@
 /* Each returns an exit code. `argv[0]` is the name of the program with the subcommand. */
 int cli_bend(int argc, char **argv);
 int cli_pressure(int argc, char **argv);
+int cli_vent(int argc, char **argv);
+int cli_hold(int argc, char **argv);
+int cli_clear(int argc, char **argv);
+int cli_params(int argc, char **argv);
+int cli_update(int argc, char **argv);
+int cli_monitor(int argc, char **argv);
 int cli_status(int argc, char **argv);
 int cli_plot(int argc, char **argv);
 int cli_record(int argc, char **argv);
@@ -22,6 +29,7 @@ int cli_effects(int argc, char **argv);
 int cli_run(int argc, char **argv);
 int cli_board(int argc, char **argv);
 int cli_view(int argc, char **argv);
+int cli_bridge(int argc, char **argv);
 /* `tribend gap plan` */
 int gap_plan_run(int argc, char **argv);
 /* `tribend gap close` */
@@ -30,12 +38,17 @@ int gap_close_run(int argc, char **argv);
 /* Options of every subcommand that talks to a controller. */
 struct bus_options {
     const char *bus;
-    const char *table;  /* NULL: $TRIBEND_TABLE, else the reference table */
+    uint32_t node;      /* of the board on it */
+    const char *table;  /* NULL: $TRIBEND_TABLE, else the reference table; on a real bus: whatever the board has */
     const char *module; /* the module that the table must be of; NULL: any */
     const char *record;
     uint64_t seed;
     double duration_s;
     bool quiet;
+    bool hold_on_interrupt; /* Ctrl-C holds the pressures, a second one vents */
+    bool needs_table;       /* of the board, in a file on this computer */
+    bool vent_at_once;      /* before anything is known of the board, whatever its version */
+    const char *sim_only;   /* an option that makes sense in the simulation only; NULL: none was given */
     struct effect effect[PLANT_EFFECTS_MAX];
     size_t effect_count;
     const char *calibration;            /* the simulated module is as this file says; NULL: nominal */
@@ -64,13 +77,24 @@ struct bus {
     unsigned char *controller_image; /* of the controller's table, for drills */
     const char *table_path;
     char found[PROGRAM_PATH_BYTES];
+    struct can_link *can; /* NULL: simulated */
+    struct can_link_identity identity;
+    const char *module_name;
+    uint64_t table_hash;
+    double rate_hz; /* of reports */
 };
 
 /* The table that is meant: `table`, else $TRIBEND_TABLE, else the reference table. */
 const char *bus_table_path(const char *table, char found[PROGRAM_PATH_BYTES]);
 /* Returns an exit code, with the message printed. */
 int bus_open(struct bus *bus, const struct bus_options *options);
+/* The same of a bus that is not simulated. */
+int bus_open_can(struct bus *bus, const struct bus_options *options);
 void bus_close(struct bus *bus);
+/* Faults that a drill puts into the simulation. */
+void bus_drill(struct bus *bus, const struct bus_options *options);
+/* The message that nothing comes any more; returns the exit code. */
+int bus_gone(struct bus *bus, const struct bus_options *options);
 
 /* Follow `command` for the options' duration, vent, say how it went; returns an exit code. */
 int run_command(const struct bus_options *options, const struct controller_command *command);

@@ -13,7 +13,12 @@
 
 static const struct argp_option option_list[] = {
     {"for", 'f', "TIME", 0, "how long, such as 5s (default 5s)", 1},
-    {"bus", 'b', "BUS", 0, "where the controller is: sim, controller and plant in this process (default)", 1},
+    {"bus", 'b', "BUS", 0,
+     "where the controller is: sim, controller and plant in this process (default); can0 or another CAN interface; "
+     "slcan:/dev/ttyACM0[@BITRATE]; unix:PATH, an emulated board",
+     1},
+    {"node", 'n', "N", 0, "node id of the board on the bus, 1 to 15 (default 1)", 1},
+    {"on-interrupt", 'I', "vent|hold", 0, "what Ctrl-C does: vent (default), or hold until it is pressed again", 1},
     {"table", 't', "FILE", 0, "bend table (default $TRIBEND_TABLE, else " REFERENCE_TABLE ")", 1},
     {"module", 'm', "NAME", 0, "refuse a table of any other module", 1},
     {"record", 'r', "FILE", 0, "write a run log (CSV)", 1},
@@ -80,8 +85,14 @@ static error_t parse(int key, char *argument, struct argp_state *state) {
         return 0;
     case 'b':
         options->bus = argument;
-        if (strcmp(argument, "sim") != 0) {
-            argp_error(state, "--bus: there is no bus '%s'; there is: sim", argument);
+        return 0;
+    case 'n':
+        options->node = (uint32_t)cli_whole_number(state, "--node", argument, 1, (int)MESSAGE_NODE_MOST);
+        return 0;
+    case 'I':
+        options->hold_on_interrupt = strcmp(argument, "hold") == 0;
+        if (!options->hold_on_interrupt && strcmp(argument, "vent") != 0) {
+            argp_error(state, "--on-interrupt: '%s' is neither vent nor hold", argument);
         }
         return 0;
     case 't':
@@ -94,24 +105,34 @@ static error_t parse(int key, char *argument, struct argp_state *state) {
         options->record = argument;
         return 0;
     case 's':
+        options->sim_only = "--seed";
         parse_seed(state, argument, options);
         return 0;
     case 'e':
+        options->sim_only = "--effect";
         parse_effect(state, argument, options);
         return 0;
     case 'k':
+        options->sim_only = "--calibration";
         options->calibration = argument;
         return 0;
     case 'K':
+        options->sim_only = "--controller-calibration";
         options->controller_calibration = argument;
         return 0;
     case 'd':
+        options->sim_only = "--drill";
         if (!sim_drill_parse(argument, &options->drill, error, sizeof error)) {
             argp_error(state, "--drill: %s", error);
         }
         return 0;
     case 'q':
         options->quiet = true;
+        return 0;
+    case ARGP_KEY_END:
+        if (options->sim_only != NULL && strcmp(options->bus, "sim") != 0) {
+            argp_error(state, "%s is for the simulation: it does nothing on bus %s", options->sim_only, options->bus);
+        }
         return 0;
     default:
         return ARGP_ERR_UNKNOWN;
@@ -123,6 +144,7 @@ const struct argp bus_options_parser = {.options = option_list, .parser = parse}
 void bus_options_init(struct bus_options *options) {
     memset(options, 0, sizeof *options);
     options->bus = "sim";
+    options->node = CAN_LINK_NODE_DEFAULT;
     options->seed = 1;
     options->duration_s = 5.0;
 }
@@ -192,11 +214,17 @@ int bus_open(struct bus *bus, const struct bus_options *options) {
     struct sim_link_setup setup;
     struct calibration calibration = {.effects = 0};
     memset(bus, 0, sizeof *bus);
+    if (strcmp(options->bus, "sim") != 0) {
+        return bus_open_can(bus, options);
+    }
+    bus->rate_hz = 1e6 / (double)CONTROLLER_STEP_US;
     bus->table_path = bus_table_path(options->table, bus->found);
     int code = table_file_open(&bus->file, bus->table_path, options->module);
     if (code != EXIT_OK) {
         return code;
     }
+    bus->module_name = bus->file.table.module.name;
+    bus->table_hash = bus->file.table.module.inputs_hash;
     sim_link_default_setup(&setup, &bus->file.table, options->seed);
     bus->controller_image = bus->file.bytes;
     code = calibrate_module(bus, options, &calibration, &setup);
@@ -214,7 +242,23 @@ void bus_close(struct bus *bus) {
     if (bus->controller_calibrated) {
         calibrated_controller_free(&bus->controller);
     }
-    table_file_close(&bus->file);
+    if (bus->file.bytes != NULL) {
+        table_file_close(&bus->file);
+    }
+}
+
+void bus_drill(struct bus *bus, const struct bus_options *options) {
+    if (bus->can == NULL) {
+        sim_drill_apply(&options->drill, &bus->sim, bus->controller_image, bus->file.size);
+    }
+}
+
+int bus_gone(struct bus *bus, const struct bus_options *options) {
+    const double silence_s = bus->can == NULL ? 0.0 : 1e-6 * (double)can_link_silence_us(bus->can);
+    return program_fail(EXIT_BUS,
+                        "the board on bus %s went away: nothing came for %.1f s. While it hears nothing, it vents by "
+                        "itself on its command timeout",
+                        options->bus, silence_s);
 }
 
 static void append(char *text, size_t bytes, const char *word) {

@@ -2,11 +2,13 @@
 #include <inttypes.h>
 #include <stdio.h>
 #include <string.h>
+#include <time.h>
 
 #include "cli/commands.h"
 #include "log/run_log.h"
 
 #define WORDS_BYTES 512
+#define LOOK_US 100000 /* for Ctrl-C, while nothing comes */
 
 static const struct argp_option options[] = {
     {"output", 'o', "RUN.csv", 0, "the run log to write (required)", 0}, {0}};
@@ -43,45 +45,70 @@ static const struct argp parser = {options,
                                    NULL,
                                    NULL};
 
+/* On a bus the clock on the wall says when it is over: the board's stands still while the board is away. */
+static bool is_over(const struct bus *bus, const struct bus_options *bus_options, const struct timespec *from,
+                    int64_t since_us) {
+    struct timespec now;
+    (void)clock_gettime(CLOCK_MONOTONIC, &now);
+    const double wall_s = (double)(now.tv_sec - from->tv_sec) + 1e-9 * (double)(now.tv_nsec - from->tv_nsec);
+    return (bus->can != NULL ? wall_s : 1e-6 * (double)since_us) >= bus_options->duration_s;
+}
+
+/* A board that is gone may come back, and its rows go on. False: the simulation ended. */
+static bool take_row(struct bus *bus, const struct bus_options *bus_options, struct run_log_writer *log, uint64_t *rows,
+                     struct link_report *report) {
+    const struct controller_command nothing = {.kind = COMMAND_NONE};
+    bus_drill(bus, bus_options);
+    if (bus->can == NULL && !bus->link.receive(bus->link.context, report)) {
+        return false;
+    }
+    if (bus->can == NULL || can_link_receive(bus->can, LOOK_US, report) == CAN_LINK_REPORT) {
+        run_log_append(log, report, &nothing);
+        ++*rows;
+    }
+    return true;
+}
+
 /* Until the time is over, or Ctrl-C; an exit code. */
 static int follow(struct bus *bus, const struct bus_options *bus_options, struct run_log_writer *log,
                   uint64_t *rows, struct link_report *report) {
-    const struct controller_command nothing = {.kind = COMMAND_NONE};
-    int64_t end_us = 0;
+    struct timespec from;
+    int64_t start_us = -1;
+    (void)clock_gettime(CLOCK_MONOTONIC, &from);
     do {
-        sim_drill_apply(&bus_options->drill, &bus->sim, bus->controller_image, bus->file.size);
-        if (!bus->link.receive(bus->link.context, report)) {
-            return program_fail(EXIT_OUTPUT, "the controller on bus %s went away after %" PRIu64 " rows",
-                                bus_options->bus, *rows);
+        if (!take_row(bus, bus_options, log, rows, report)) {
+            return bus_gone(bus, bus_options);
         }
-        end_us = *rows == 0 ? report->time_us + (int64_t)(1e6 * bus_options->duration_s) : end_us;
-        run_log_append(log, report, &nothing);
-        ++*rows;
-    } while (report->time_us < end_us && program_interrupted == 0);
+        start_us = start_us < 0 && *rows > 0 ? report->time_us : start_us;
+    } while (!is_over(bus, bus_options, &from, report->time_us - start_us) && program_interrupted == 0);
     return program_interrupted == 0 ? EXIT_OK : EXIT_INTERRUPTED;
 }
 
-static void print_summary(const struct bus_options *bus_options, const struct link_report *report,
+static void print_summary(struct bus *bus, const struct bus_options *bus_options, const struct link_report *report,
                           uint64_t rows) {
     char words[WORDS_BYTES];
     printf("rows      %" PRIu64 ", until %.3f s\n", rows, 1e-6 * (double)report->time_us);
     printf("state     %s\n", supervisor_state_name(report->status.state));
     cli_describe_faults(report->status.faults, words, sizeof words);
     printf("faults    %s\n", words);
+    if (bus->can != NULL) {
+        struct can_link_counters counters;
+        can_link_count(bus->can, &counters);
+        printf("lost      %" PRIu64 " reports on the way, %" PRIu64 " here; the board fell silent %" PRIu64
+               " times, started anew %" PRIu64 " times\n",
+               counters.missing, counters.dropped + counters.overflowed, counters.silences, counters.restarts);
+    }
     printf("wrote     %s\n", bus_options->record);
 }
 
 static int record(struct bus *bus, const struct bus_options *bus_options) {
-    const struct bend_table_module *module = &bus->file.table.module;
     char error[PROGRAM_ERROR_BYTES], note[64];
     struct run_log_writer log;
     struct link_report report;
     uint64_t rows = 0;
     (void)snprintf(note, sizeof note, "bus %s, seed %" PRIu64, bus_options->bus, bus_options->seed);
-    const struct run_log_metadata metadata = {.module = module->name,
-                                              .table_hash = module->inputs_hash,
-                                              .rate_hz = 1e6 / (double)CONTROLLER_STEP_US,
-                                              .note = note};
+    const struct run_log_metadata metadata = {
+        .module = bus->module_name, .table_hash = bus->table_hash, .rate_hz = bus->rate_hz, .note = note};
     memset(&report, 0, sizeof report);
     if (!run_log_create(&log, bus_options->record, &metadata, error, sizeof error)) {
         return program_fail(EXIT_OUTPUT, "%s", error);
@@ -91,7 +118,7 @@ static int record(struct bus *bus, const struct bus_options *bus_options) {
     if (!run_log_finish(&log, error, sizeof error)) { /* what came before the link went is worth keeping */
         return program_fail(EXIT_OUTPUT, "%s", error);
     }
-    print_summary(bus_options, &report, rows);
+    print_summary(bus, bus_options, &report, rows);
     return code == EXIT_OK && report.status.faults != 0u ? EXIT_FAULT : code;
 }
 

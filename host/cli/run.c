@@ -6,11 +6,15 @@
 
 #include "cli/commands.h"
 #include "cli/run_course.h"
+#include "comms/node.h"
 #include "log/run_log.h"
 #include "report/run_summary.h"
 
 #define DEGREES (180.0 / M_PI)
 #define READY_WITHIN_US 2000000
+#define STARTED_WITHIN_US 2000000
+#define REFUSALS_TRIED 16
+#define REFUSALS_US 50000
 #define REPEAT_US 100000
 #define CHANGE_US 10000 /* a command that changes is sent at most this often */
 #define PROGRESS_US 500000
@@ -28,7 +32,12 @@ struct run {
     int64_t next_send_us;
     int64_t next_progress_us;
     struct run_summary summary;
+    bool moved; /* since the start */
 };
+
+static bool supervisor_moves(enum supervisor_state state) {
+    return state == SUPERVISOR_ACTIVE || state == SUPERVISOR_HOLD;
+}
 
 static bool is_same(const struct controller_command *a, const struct controller_command *b) {
     return a->kind == b->kind && a->pressure_pa[0] == b->pressure_pa[0] &&
@@ -51,7 +60,7 @@ static bool send(struct run *run, const struct controller_command *command, int6
 /* One report, logged; false: the link is gone. */
 static bool receive(struct run *run, struct link_report *report) {
     struct bus *bus = run->bus;
-    sim_drill_apply(&run->options->drill, &bus->sim, bus->controller_image, bus->file.size);
+    bus_drill(bus, run->options);
     if (!bus->link.receive(bus->link.context, report)) {
         return false;
     }
@@ -79,18 +88,56 @@ static void show_progress(struct run *run, const struct link_report *report) {
 
 /* Until SAFE; an exit code. */
 static int wait_ready(struct run *run, struct link_report *report) {
+    int64_t until_us = INT64_MAX;
     do {
         if (!receive(run, report)) {
-            return program_fail(EXIT_OUTPUT, "the controller on bus %s went away", run->options->bus);
+            return bus_gone(run->bus, run->options);
         }
+        until_us = until_us == INT64_MAX ? report->time_us + READY_WITHIN_US : until_us;
         if (report->status.state == SUPERVISOR_FAULT) {
             return EXIT_FAULT;
         }
-        if (report->time_us > READY_WITHIN_US) {
+        if (report->time_us > until_us && supervisor_moves(report->status.state)) {
+            return program_fail(EXIT_REFUSED,
+                                "the controller is in %s: another host commands it; stop that one, or say tribend vent",
+                                supervisor_state_name(report->status.state));
+        }
+        if (report->time_us > until_us) {
             return program_fail(EXIT_FAULT, "the controller stayed in %s: do all chambers read under 2 kPa?",
                                 supervisor_state_name(report->status.state));
         }
     } while (report->status.state != SUPERVISOR_SAFE);
+    return EXIT_OK;
+}
+
+static int explain_refusal(struct run *run) {
+    union message message = {.refusals = {.count = 0}};
+    for (int i = 0; i < REFUSALS_TRIED && message.refusals.count == 0; i++) {
+        struct can_link_answer answer;
+        if (can_link_answer(run->bus->can, REFUSALS_US, &answer) && answer.id == MESSAGE_REFUSALS) {
+            message = answer.message;
+        }
+    }
+    return program_fail(EXIT_REFUSED, "the board did not start to move: %s",
+                        message.refusals.count > 0 ? node_refusal_text((enum node_refusal)message.refusals.reason)
+                                                   : "it did not say why");
+}
+
+/* Does it still do what it was told? An exit code, with the message printed but for EXIT_FAULT. */
+static int judge(struct run *run, const struct link_report *report, int64_t start_us) {
+    const bool moves = supervisor_moves(report->status.state);
+    if (report->status.state == SUPERVISOR_FAULT) {
+        return EXIT_FAULT;
+    }
+    if (run->moved && !moves && run->command.kind != COMMAND_VENT) {
+        return program_fail(EXIT_REFUSED, "at %.2f s the board went to %s: another host vented it, or it started anew",
+                            1e-6 * (double)report->time_us, supervisor_state_name(report->status.state));
+    }
+    run->moved = moves;
+    if (run->bus->can != NULL && !moves && run->command.kind != COMMAND_VENT &&
+        report->time_us > start_us + STARTED_WITHIN_US) {
+        return explain_refusal(run);
+    }
     return EXIT_OK;
 }
 
@@ -104,12 +151,13 @@ static int follow(struct run *run, const struct run_course *course, struct link_
     while (report->time_us < end_us && program_interrupted == 0) {
         course->command_at(course->context, 1e-6 * (double)(report->time_us - start_us), &command);
         if (!send(run, &command, report->time_us) || !receive(run, report)) {
-            return program_fail(EXIT_OUTPUT, "the controller on bus %s went away", run->options->bus);
+            return bus_gone(run->bus, run->options);
         }
         run_summary_add(&run->summary, report);
         show_progress(run, report);
-        if (report->status.state == SUPERVISOR_FAULT) {
-            return EXIT_FAULT;
+        const int code = judge(run, report, start_us);
+        if (code != EXIT_OK) {
+            return code;
         }
     }
     return program_interrupted == 0 ? EXIT_OK : EXIT_INTERRUPTED;
@@ -130,6 +178,20 @@ static bool vent(struct run *run, struct link_report *report) {
         vented = pressure_pa[0] < VENTED_PA && pressure_pa[1] < VENTED_PA && pressure_pa[2] < VENTED_PA;
     }
     return vented;
+}
+
+/* Until Ctrl-C comes again, a fault, or the bus' end. */
+static void hold(struct run *run, struct link_report *report) {
+    const struct controller_command command = {.kind = COMMAND_HOLD};
+    program_interrupted = 0;
+    program_catch_interrupt();
+    run->next_send_us = report->time_us;
+    while (program_interrupted == 0 && report->status.state != SUPERVISOR_FAULT) {
+        if (!send(run, &command, report->time_us) || !receive(run, report)) {
+            return;
+        }
+        show_progress(run, report);
+    }
 }
 
 static void print_followed(const struct run_summary *summary) {
@@ -187,11 +249,27 @@ static int explain_fault(const struct link_report *report) {
 }
 
 static int run_on_bus(struct run *run, const struct run_course *course) {
+    const struct controller_command vent_command = {.kind = COMMAND_VENT};
     struct link_report report;
     memset(&report, 0, sizeof report);
     int code = wait_ready(run, &report);
+    if (code == EXIT_REFUSED) {
+        return code; /* what moves there is another host's */
+    }
     if (code == EXIT_OK) {
         code = follow(run, course, &report);
+    }
+    if (code == EXIT_BUS) {
+        (void)run->bus->link.send(run->bus->link.context, &vent_command);
+        return code;
+    }
+    if (code == EXIT_INTERRUPTED) {
+        printf("interrupted at %.2f s: %s\n", 1e-6 * (double)report.time_us,
+               run->options->hold_on_interrupt ? "holding, Ctrl-C again vents" : "venting");
+        (void)fflush(stdout);
+    }
+    if (code == EXIT_INTERRUPTED && run->options->hold_on_interrupt) {
+        hold(run, &report);
     }
     struct link_report last = report;
     const int64_t vent_us = report.time_us;
@@ -203,9 +281,6 @@ static int run_on_bus(struct run *run, const struct run_course *course) {
             print_followed(&run->summary);
         }
         print_health(&last);
-    }
-    if (code == EXIT_INTERRUPTED) {
-        printf("interrupted at %.2f s\n", 1e-6 * (double)last.time_us);
     }
     if (vented) {
         printf("vented    in %.2f s\n", 1e-6 * (double)(report.time_us - vent_us));
@@ -226,17 +301,14 @@ int run_course(const struct bus_options *options, const struct run_course *cours
     if (code != EXIT_OK) {
         return code;
     }
-    const struct bend_table_module *module = &bus.file.table.module;
     (void)snprintf(note, sizeof note, "%sbus %s, seed %" PRIu64, course->note, options->bus, options->seed);
-    const struct run_log_metadata metadata = {.module = module->name,
-                                              .table_hash = module->inputs_hash,
-                                              .rate_hz = 1e6 / (double)CONTROLLER_STEP_US,
-                                              .note = note};
+    const struct run_log_metadata metadata = {
+        .module = bus.module_name, .table_hash = bus.table_hash, .rate_hz = bus.rate_hz, .note = note};
     if (options->record != NULL && !run_log_create(&log, options->record, &metadata, error, sizeof error)) {
         bus_close(&bus);
         return program_fail(EXIT_OUTPUT, "%s", error);
     }
-    printf("module    %s, table %s\n", module->name, bus.table_path);
+    printf("module    %s, table %s\n", bus.module_name, bus.table_path);
     program_catch_interrupt();
     struct run run = {.options = options, .bus = &bus, .log = options->record != NULL ? &log : NULL};
     code = run_on_bus(&run, course);

@@ -107,7 +107,7 @@ struct session {
 static bool session_receive(void *context, struct link_report *report) {
     struct session *session = context;
     struct bus *bus = &session->bus;
-    sim_drill_apply(&session->arguments->bus.drill, &bus->sim, bus->controller_image, bus->file.size);
+    bus_drill(bus, &session->arguments->bus);
     if (!bus->link.receive(bus->link.context, report)) {
         return false;
     }
@@ -160,16 +160,18 @@ static void wait_for_the_end(const struct session *session) {
     }
 }
 
-static int summarise(const struct session *session) {
+static int summarise(struct session *session) {
     const struct view_pump *pump = &session->pump;
     printf("requests  %" PRIu64 " refused; events that could not be made: %" PRIu64
-           "; fell behind the clock %u times\n",
-           session->server.refused, session->hub.events_unmade, pump->slipped);
+           "; fell behind the clock %u times, lost the "
+           "board %u times\n",
+           session->server.refused, session->hub.events_unmade, pump->slipped, pump->lost);
     if (pump->gone) {
-        return program_fail(EXIT_OUTPUT, "the controller on bus %s went away", session->arguments->bus.bus);
+        return bus_gone(&session->bus, &session->arguments->bus);
     }
     if (!pump->vented) {
-        return program_fail(EXIT_FAULT, "the chambers did not vent");
+        return pump->lost > 0 ? bus_gone(&session->bus, &session->arguments->bus)
+                              : program_fail(EXIT_FAULT, "the chambers did not vent");
     }
     printf("vented\n");
     return program_interrupted != 0 && session->arguments->bus.duration_s > 0.0 ? EXIT_INTERRUPTED : EXIT_OK;
@@ -180,7 +182,8 @@ static int pump(struct session *session) {
     const char *bus = session->arguments->bus.bus;
     session->pump.hub = &session->hub;
     session->pump.link = (struct link){.context = session, .send = session_send, .receive = session_receive};
-    session->pump.paced = strcmp(bus, "sim") == 0;
+    session->pump.comes_back = session->bus.can != NULL;
+    session->pump.paced = session->bus.can == NULL;
     session->pump.wake = view_server_wake;
     session->pump.wake_context = &session->server;
     program_catch_interrupt();
@@ -223,7 +226,7 @@ static int record(struct session *session) {
     (void)snprintf(note, sizeof note, "live view, bus %.40s", bus_options->bus);
     const struct run_log_metadata metadata = {.module = module->name,
                                               .table_hash = module->inputs_hash,
-                                              .rate_hz = 1e6 / (double)CONTROLLER_STEP_US,
+                                              .rate_hz = session->bus.rate_hz,
                                               .note = note};
     if (!run_log_create(&session->log, bus_options->record, &metadata, error, sizeof error)) {
         return program_fail(EXIT_OUTPUT, "%s", error);
@@ -260,6 +263,7 @@ int cli_view(int argc, char **argv) {
     static struct session session;
     struct arguments arguments = {.listen = "127.0.0.1", .port = PORT, .lease_s = LEASE_S};
     bus_options_init(&arguments.bus);
+    arguments.bus.needs_table = true;
     arguments.bus.duration_s = 0.0; /* until Ctrl-C */
     argp_err_exit_status = EXIT_USAGE;
     if (argp_parse(&parser, argc, argv, 0, NULL, &arguments) != 0) {

@@ -44,6 +44,7 @@ bool plan_drive_follow(const struct plan_bench *bench, const struct gap_model *m
 bool plan_drive_record(const struct plan_bench *bench, const struct gap_run *run, struct plan_drive *drive);
 void plan_drive_free(struct plan_drive *drive);
 
+/* A trace of so many samples, and what the model makes of a drive, written into it. False: out of memory. */
 size_t plan_drive_samples(const struct plan_bench *bench, const struct plan_drive *drive);
 bool plan_trace_open(struct plan_trace *trace, size_t samples);
 void plan_trace_close(struct plan_trace *trace);

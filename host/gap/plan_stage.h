@@ -74,6 +74,7 @@ void plan_stage_gas(const struct plan_stage *stage, const struct plan_view *from
 bool plan_room_open(struct plan_room *room, const struct plan_stage *stage);
 void plan_room_close(struct plan_room *room);
 
+/* What the stage shows where that candidate is the truth. False: the room has no memory for it. */
 bool plan_truth_open(struct plan_truth *truth, const struct plan_stage *stage, size_t candidate,
                      struct plan_room *room);
 void plan_truth_close(struct plan_truth *truth);

@@ -6,6 +6,7 @@
 
 #include "gap/report_series.h"
 
+/* As HTML with SVG in it. */
 void report_runs(FILE *out, const struct report_series *series, const struct gap_data *data);
 
 #endif

@@ -5,6 +5,7 @@
 
 #include <stdio.h>
 
+/* As an HTML style element. */
 void report_style(FILE *out);
 
 #endif

@@ -12,7 +12,7 @@
 const struct lcm_type lcm_types[] = {
     {.name = "status_t",
      .channel = "TRIBEND_STATUS",
-     .fields = 8,
+     .fields = 11,
      .field = {{.type = "int64_t", .name = "utime"},
                {.type = "int32_t",
                 .name = "pressure_pa",
@@ -32,7 +32,10 @@ const struct lcm_type lcm_types[] = {
                 .factor = 1e-6},
                {.type = "int8_t", .name = "state", .column = {"state"}, .factor = 1.0},
                {.type = "int32_t", .name = "faults"},
-               {.type = "int32_t", .name = "warnings"}}},
+               {.type = "int32_t", .name = "warnings"},
+               {.type = "int32_t", .name = "bend_urad"},
+               {.type = "int32_t", .name = "direction_urad"},
+               {.type = "int8_t", .name = "bend_is_measured"}}},
     {.name = "tip_t",
      .channel = "TRIBEND_TIP",
      .fields = 6,
@@ -138,12 +141,13 @@ size_t lcm_type_decode(const struct lcm_type *type, const uint8_t *message, int6
         const bool wanted = field->only_of_kind == 0 || field->only_of_kind == kind;
         for (size_t e = 0; e < elements(field); e++) {
             const int64_t value = read_signed(at, element_bytes(field));
+            const bool lacks = element_bytes(field) == sizeof(int32_t) && value == INT32_MIN;
             at += element_bytes(field);
             if (f == 0) {
                 *utime_us = value;
             } else if (strcmp(field->name, "kind") == 0) {
                 kind = value;
-            } else if (field->column[e] != NULL && wanted) {
+            } else if (field->column[e] != NULL && wanted && !lacks) {
                 values[count++] = (struct event_value){field->column[e], field->factor * (double)value};
             }
         }

@@ -59,6 +59,12 @@ void view_arm_release(struct view_arm *arm, const char *page, enum view_arm_end 
     }
 }
 
+void view_arm_lose(struct view_arm *arm, int64_t time_us) {
+    if (arm->armed) {
+        end_by(arm, VIEW_ARM_LOST, time_us);
+    }
+}
+
 void view_arm_vent(struct view_arm *arm, int64_t time_us) {
     end_by(arm, VIEW_ARM_VENTED, time_us);
 }
@@ -114,6 +120,8 @@ const char *view_arm_end_text(enum view_arm_end end) {
         return "nothing was changed for long: vented";
     case VIEW_ARM_FAULT:
         return "the controller latched a fault";
+    case VIEW_ARM_LOST:
+        return "the board fell silent; it vents by itself then";
     case VIEW_ARM_NEVER:
     default:
         return "not armed";

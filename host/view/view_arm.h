@@ -21,7 +21,8 @@ enum view_arm_end {
     VIEW_ARM_SILENT, /* the lease ran out */
     VIEW_ARM_GONE,   /* the page's event stream ended */
     VIEW_ARM_IDLE,
-    VIEW_ARM_FAULT /* the controller is in FAULT */
+    VIEW_ARM_FAULT, /* the controller is in FAULT */
+    VIEW_ARM_LOST   /* nothing came from the controller */
 };
 
 struct view_arm {
@@ -45,6 +46,8 @@ bool view_arm_command(struct view_arm *arm, const char *page, const struct contr
                       int64_t time_us);
 /* The page's stream ended, or it gave the arm back; nothing, where it does not hold it. */
 void view_arm_release(struct view_arm *arm, const char *page, enum view_arm_end end, int64_t time_us);
+/* Nothing came from the controller for long: whoever holds the arm loses it. */
+void view_arm_lose(struct view_arm *arm, int64_t time_us);
 /* Vent, whoever holds the arm. */
 void view_arm_vent(struct view_arm *arm, int64_t time_us);
 void view_arm_clear(struct view_arm *arm);

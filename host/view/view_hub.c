@@ -44,6 +44,12 @@ bool view_hub_report(struct view_hub *hub, const struct link_report *report, int
     return send;
 }
 
+void view_hub_lost(struct view_hub *hub) {
+    (void)pthread_mutex_lock(&hub->lock);
+    view_arm_lose(&hub->arm, view_hub_now_us());
+    (void)pthread_mutex_unlock(&hub->lock);
+}
+
 size_t view_hub_event(struct view_hub *hub, uint64_t *sequence, char text[VIEW_EVENT_BYTES]) {
     size_t length = 0;
     (void)pthread_mutex_lock(&hub->lock);

@@ -32,6 +32,8 @@ int64_t view_hub_now_us(void);
 /* A report has come. True: `command` is to be sent. `fresh`: there is a new event. */
 bool view_hub_report(struct view_hub *hub, const struct link_report *report, int64_t now_us,
                      struct controller_command *command, bool *fresh);
+/* No report has come for long. */
+void view_hub_lost(struct view_hub *hub);
 /* The event after `*sequence` into `text`; 0: there is none yet. */
 size_t view_hub_event(struct view_hub *hub, uint64_t *sequence, char text[VIEW_EVENT_BYTES]);
 

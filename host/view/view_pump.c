@@ -5,6 +5,7 @@
 
 #define AHEAD_US 4000    /* sleep when so far ahead of the clock */
 #define BEHIND_US 200000 /* so far behind, the clock starts anew */
+#define LOST_NS 50000000
 #define VENT_WITHIN_US 10000000
 #define VENTED_PA 500.0f
 
@@ -26,15 +27,26 @@ static void pace(struct view_pump *pump, struct pace *pace, int64_t report_us) {
     }
 }
 
+/* False: it does not come back. */
+static bool wait_for_the_link(struct view_pump *pump) {
+    const struct timespec moment = {.tv_nsec = LOST_NS};
+    if (pump->comes_back) {
+        pump->lost++;
+        view_hub_lost(pump->hub);
+        (void)nanosleep(&moment, NULL);
+    }
+    return pump->comes_back;
+}
+
 static bool exchange(struct view_pump *pump, struct pace *kept) {
     struct controller_command command;
     bool fresh = false;
     if (!pump->link.receive(pump->link.context, &pump->last)) {
-        return false;
+        return wait_for_the_link(pump);
     }
     const bool send = view_hub_report(pump->hub, &pump->last, view_hub_now_us(), &command, &fresh);
     if (send && !pump->link.send(pump->link.context, &command)) {
-        return false;
+        return wait_for_the_link(pump);
     }
     if (fresh) {
         pump->wake(pump->wake_context);

@@ -10,6 +10,7 @@
 struct view_pump {
     struct view_hub *hub;
     struct link link;
+    bool comes_back; /* a link that gives up is tried again */
     bool paced; /* the link does not keep time by itself: hold it to the clock */
     /* Called after each new event, from the pump's thread. */
     void (*wake)(void *context);
@@ -18,6 +19,7 @@ struct view_pump {
     atomic_bool ended;
     bool gone;        /* the link ended by itself */
     bool vented;      /* at the end */
+    uint32_t lost;    /* times that the link gave up */
     uint32_t slipped; /* times that it fell far behind the clock */
     struct link_report last;
     pthread_t thread;

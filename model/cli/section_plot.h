@@ -4,6 +4,7 @@
 
 #include "section/section_solver.h"
 
+/* As the solver left it, into a PNG file. False: `error` says why there is none. */
 bool section_plot(const char *png_path, const struct module_description *module, const struct section_mesh *mesh,
                   struct section_solver *solver, char *error, size_t error_bytes);
 

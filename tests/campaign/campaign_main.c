@@ -139,6 +139,21 @@ static void name_wrong(const struct series *series, const struct trial_result *r
     }
 }
 
+/* Pairs may hold a chamber over the working limit, but never burst it: the ones that did, by name. */
+static void list_pairs(const struct series *series, const struct trial_result *result, const bool *done) {
+    for (size_t i = 0; i < series->trials; i++) {
+        struct trial trial;
+        const struct oracle *oracle = &result[i].oracle;
+        if (done[i] && oracle->over_longest_us > TALLY_OVER_MOST_US) {
+            series_trial(series, i, &trial);
+            printf("  over the working limit: %s and %s, chambers %zu and %zu, %.2f kPa, %lld ms, seed %llu\n",
+                   name_of(trial.injection[0]), name_of(trial.injection[1]), result[i].chamber[0] + 1,
+                   result[i].chamber[1] + 1, 1e-3 * oracle->highest_pa, (long long)(oracle->over_longest_us / 1000),
+                   (unsigned long long)trial.seed);
+        }
+    }
+}
+
 static void print_singles(const struct series *series, const struct trial_result *result, const bool *done) {
     tally_print_head(stdout);
     for (size_t k = 0; k < injection_count(); k++) {
@@ -157,7 +172,8 @@ static void print_singles(const struct series *series, const struct trial_result
             tally_print_row(stdout, injection_at(k)->name, &row);
         }
         if (row.end[TRIAL_HARMLESS] > 0) {
-            printf("  harmless: the valves were off and pressures only fell, or they were within %.2f kPa of those without it\n",
+            printf("  harmless: the valves were off and pressures only fell, or they were within %.2f kPa of those "
+                   "without it\n",
                    1e-3 * row.apart_pa);
         }
         tally_row_close(&row);
@@ -220,6 +236,7 @@ static bool run(struct campaign *campaign, const struct fitting *fitting, const 
             print_singles(series, result, done);
         } else if (shown == SHOW_ALL) {
             print_all(name, series, result, done);
+            list_pairs(series, result, done);
         } else {
             print_fitting(fitting->name, name, series, result, done);
         }
@@ -251,7 +268,8 @@ static bool run_all(struct campaign *campaign) {
     ran = ran && run(campaign, &fittings[0], &pairs, SHOW_ALL, "all pairs") &&
           run(campaign, &fittings[0], &sound, SHOW_ALL, "nothing");
     printf("\nWhat may be fitted to the air, with valves that fail, and with a supply that rises and something else:\n");
-    printf("%-34s %-18s %7s %8s %12s %13s %9s\n", "fitted", "broken", "trials", "bursts", "over 50 ms", "never vented", "kPa");
+    printf("%-34s %-18s %7s %8s %12s %13s %9s\n", "fitted", "broken", "trials", "bursts", "over 50 ms", "never vented",
+           "kPa");
     for (size_t f = 0; f < fitted && ran; f++) {
         struct series stuck = {SERIES_SINGLE, options->seed + 1, tried, "FAULT_VALVE"};
         ran = run(campaign, &fittings[f], &stuck, SHOW_FITTING, "valves");

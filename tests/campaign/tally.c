@@ -89,7 +89,8 @@ void tally_print_row(FILE *file, const char *name, struct tally_row *row) {
     print_times(file, row->seen_us, row->seen);
     fprintf(file, " ");
     print_times(file, row->vent_us, row->vented);
-    fprintf(file, " %7zu %8.2f %9lld\n", row->never_vented, 1e-3 * row->highest_pa, (long long)(row->over_longest_us / 1000));
+    fprintf(file, " %7zu %8.2f %9lld\n", row->never_vented, 1e-3 * row->highest_pa,
+            (long long)(row->over_longest_us / 1000));
 }
 
 void tally_print_wrong(FILE *file, uint32_t wrong) {

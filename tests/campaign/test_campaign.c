@@ -27,6 +27,16 @@ static void nominal_plant(struct plant_parameters *plant) {
     plant_default_parameters(plant);
 }
 
+static size_t named(const char *name) {
+    for (size_t k = 0; k < injection_count(); k++) {
+        if (strcmp(injection_at(k)->name, name) == 0) {
+            return k;
+        }
+    }
+    fail_msg("there is no injection '%s'", name);
+    return TRIAL_NONE;
+}
+
 /* Every trial is run, and nothing is wrong in any. */
 static void run(const struct series *series, const struct plant_parameters *plant, struct trial_result *result) {
     bool *done = calloc(series->trials, sizeof *done);
@@ -101,10 +111,7 @@ static void without_a_shut_off_valve_a_stuck_one_bursts_the_chamber(void **state
     struct trial_result bare, fitted, relieved;
     nominal_plant(&plant);
     assert_true(trial_place_open(&place, &file.table));
-    struct trial trial = {.seed = 5, .injection = {0, TRIAL_NONE}};
-    while (strcmp(injection_at(trial.injection[0])->name, "valve stuck filling") != 0) {
-        trial.injection[0]++;
-    }
+    const struct trial trial = {.seed = 5, .injection = {named("valve stuck filling"), TRIAL_NONE}};
     trial_run(&place, &plant, &trial, &fitted);
     plant.no_shut_off = true;
     trial_run(&place, &plant, &trial, &bare);
@@ -124,11 +131,9 @@ static void a_rail_that_vents_empties_a_chamber_whose_valve_sticks(void **state)
     struct trial_place place;
     struct plant_parameters plant;
     struct trial_result kept, emptied;
-    size_t stuck = 0, vented = 0, never = 0;
+    size_t vented = 0, never = 0;
+    const size_t stuck = named("valve stuck filling");
     nominal_plant(&plant);
-    while (strcmp(injection_at(stuck)->name, "valve stuck filling") != 0) {
-        stuck++;
-    }
     assert_true(trial_place_open(&place, &file.table));
     for (uint64_t seed = 1; seed <= 6; seed++) {
         const struct trial trial = {.seed = seed, .injection = {stuck, TRIAL_NONE}};
@@ -166,6 +171,40 @@ static void the_same_seed_gives_the_same_trial(void **state) {
     trial_place_close(&place);
 }
 
+/* --- what a campaign of 10,000 missions found */
+
+/* A sensor that drifts down lets the loop fill on. With other chambers filled the bend then turns more than it grows; and
+ * where no tip sensor is left to see it, the valve takes more air than the reading explains. Jumps of a vented chamber's
+ * reading below zero are not seen at once. */
+static void findings_stay_mended(void **state) {
+    (void)state;
+    static const struct {
+        uint64_t seed;
+        const char *first;
+        const char *second;
+    } found[] = {
+        {3545699308778212u, "reading drifts down", NULL},     {7007968778092638u, "reading drifts down", NULL},
+        {6075677765598724u, "reading drifts down", NULL},     {5387978944254022u, "tip scatters", "reading drifts down"},
+        {2264514588082261u, "reading jumps down", NULL},      {4406183463301802u, "reading jumps down", NULL},
+        {1474883779277073u, "reading jumps down", NULL},
+    };
+    struct trial_place place;
+    struct plant_parameters plant;
+    struct trial_result result;
+    nominal_plant(&plant);
+    assert_true(trial_place_open(&place, &file.table));
+    for (size_t i = 0; i < sizeof found / sizeof found[0]; i++) {
+        const size_t second = found[i].second != NULL ? named(found[i].second) : TRIAL_NONE;
+        const struct trial trial = {.seed = found[i].seed, .injection = {named(found[i].first), second}};
+        trial_run(&place, &plant, &trial, &result);
+        if (tally_judge(&trial, &result) != 0u) {
+            fail_msg("seed %llu: wrong 0x%x, %.0f Pa", (unsigned long long)trial.seed, tally_judge(&trial, &result),
+                     result.oracle.highest_pa);
+        }
+    }
+    trial_place_close(&place);
+}
+
 /* --- one table */
 
 static const char *const rows[] = {
@@ -189,7 +228,8 @@ static void every_row_is_injected_or_says_why_not(void **state) {
     assert_int_equal(ROWS, (int)FAULT_COUNT + (int)WARNING_COUNT);
     for (size_t r = 0; r < ROWS; r++) {
         if (is_injected(rows[r]) == (injection_left_out(rows[r]) != NULL)) {
-            fail_msg("%s: %s", rows[r], is_injected(rows[r]) ? "is injected and left out" : "is neither injected nor left out");
+            fail_msg("%s: %s", rows[r],
+                     is_injected(rows[r]) ? "is injected and left out" : "is neither injected nor left out");
         }
     }
 }
@@ -215,6 +255,7 @@ int main(void) {
         cmocka_unit_test(without_a_shut_off_valve_a_stuck_one_bursts_the_chamber),
         cmocka_unit_test(a_rail_that_vents_empties_a_chamber_whose_valve_sticks),
         cmocka_unit_test(the_same_seed_gives_the_same_trial),
+        cmocka_unit_test(findings_stay_mended),
         cmocka_unit_test(every_row_is_injected_or_says_why_not),
         cmocka_unit_test(every_injection_is_of_a_row),
     };

@@ -171,7 +171,8 @@ void trial_run(struct trial_place *place, const struct plant_parameters *plant, 
     result->seen_us = warned_us;
     if (result->oracle.latched_us != ORACLE_NEVER) {
         result->end = TRIAL_LATCHED;
-        result->seen_us = warned_us == ORACLE_NEVER || result->oracle.latched_us < warned_us ? result->oracle.latched_us : warned_us;
+        const int64_t latched_us = result->oracle.latched_us;
+        result->seen_us = warned_us == ORACLE_NEVER || latched_us < warned_us ? latched_us : warned_us;
         return;
     }
     if (warned_us != ORACLE_NEVER || trial->injection[0] == TRIAL_NONE) {

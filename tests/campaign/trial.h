@@ -44,7 +44,7 @@ struct trial_result {
 };
 
 #define TRIAL_APART_PA 1000.0
-#define TRIAL_APART_STEPS 100 /* steep flanks that come so much sooner or later are not apart */
+#define TRIAL_APART_STEPS 250 /* steep flanks that come so much sooner or later are not apart */
 
 /* False: no memory. `image` is copied. */
 bool trial_place_open(struct trial_place *place, const struct bend_table *table);

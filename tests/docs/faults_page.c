@@ -21,7 +21,7 @@ static const char head[] =
     "Whatever leaves pressure uncontrolled or unseen is a fault, because people stand next to the module. The last line of each\n"
     "row says why it is the one or the other.\n"
     "\n"
-    "What was measured of all of them: docs/fault-campaign.md.\n";
+    "`make campaign` measures all of them, alone and in pairs.\n";
 
 static void begin(const char *name, const char *title, const char *sees, const char *detector) {
     printf("\n### %s\n\n%s\n\n- **name** `%s`\n- **detector** %s\n- **limit** ", title, sees, name, detector);

@@ -64,7 +64,8 @@ static void moves_and_holds_and_vents(void **state) {
 /* --- every state that can be reached, every input ---
  *
  * Between two steps pass 50 ms; times further back than the pause are all alike. With two faults, whether the self-test is
- * healthy and every request, this is all that the supervisor can do: breadth first from its start, until nothing new comes. */
+ * healthy and every request, this is all that the supervisor can do: breadth first from its start, until nothing new
+ * comes. */
 
 #define TICK_US 50000
 #define AGES (SUPERVISOR_PAUSE_US / TICK_US + 1)

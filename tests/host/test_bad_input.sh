@@ -117,7 +117,7 @@ expect pressure_missing 2 'three pressures' "$tribend" pressure 40mbar 0mbar
 expect pressure_negative 2 'below ambient' "$tribend" pressure -- -40mbar 0mbar 0mbar
 expect pressure_without_unit 2 "'0' has no unit" "$tribend" pressure 40mbar 0 0mbar
 expect duration_zero 2 'between 0 and' "$tribend" bend 60deg --for 0s
-expect bus_unknown 2 "no bus 'can9'" "$tribend" status --bus can9
+expect bus_unknown 7 "no bus 'can9'.*unix:PATH" "$tribend" status --bus can9
 expect effect_unknown 2 'creep' "$tribend" bend 60deg --effect crep
 expect effect_out_of_bounds 2 'amplitude' "$tribend" bend 60deg --effect creep:amplitude=9
 expect drill_unknown 2 'overpressure' "$tribend" bend 60deg --drill fire@1s

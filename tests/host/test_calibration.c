@@ -498,7 +498,7 @@ static void a_controller_that_knows_the_module_follows_better(void **state) {
         {1.0, 1.0, {"pressure_gain:gain=1.1"}, CLOSE_BEND, CLOSE_NO_TIP_SENSOR, CLOSE_BEND_RAD, 5.0, 0.2},
         {1.0, 1.0, {"line_resistance:conductance_scale=0.4"}, CLOSE_BEND, CLOSE_NO_TIP_SENSOR, CLOSE_BEND_RAD, 1.5, 0.8},
         {1.0, 1.0, {"line_resistance:form=1,conductance_scale=0.4"}, CLOSE_BEND, CLOSE_NO_TIP_SENSOR, CLOSE_BEND_RAD, 1.5, 0.9},
-        {1.0, 1.0, {"valve_dead_band:least_duty=0.25,loss=1"}, CLOSE_BEND, CLOSE_NO_TIP_SENSOR, CLOSE_BEND_RAD, 1.5, 0.7},
+        {1.0, 1.0, {"valve_dead_band:least_duty=0.25,loss=0.4"}, CLOSE_BEND, CLOSE_NO_TIP_SENSOR, CLOSE_BEND_RAD, 1.1, 0.9},
         {1.0, 1.0, {"chamber_asymmetry:gain=1.12,azimuth=0.1,chamber=2"}, CLOSE_BEND, CLOSE_NO_TIP_SENSOR, CLOSE_BEND_RAD,
          5.0, 0.2},
         {1.0, 1.0, {"end_restraint:fraction=0.88"}, CLOSE_BEND, CLOSE_NO_TIP_SENSOR, CLOSE_BEND_RAD, 5.0, 0.2},

@@ -725,7 +725,7 @@ static void put_event(struct lcm_file *file, const struct lcm_type *type, const 
 }
 
 static const int64_t status_numbers[] = {
-    1234, -56, 40000, 2000, 0, 100, 40500, 250000, 0, 1000000, SUPERVISOR_ACTIVE, 0, 0};
+    1234, -56, 40000, 2000, 0, 100, 40500, 250000, 0, 1000000, SUPERVISOR_ACTIVE, 0, 0, 1047000, 1000, 1};
 static const int64_t tip_numbers[] = {4990000, -12345, 500, 64000, 990000000, -100000000, 0, 5, 97, 3};
 static const int64_t bend_numbers[] = {COMMAND_BEND, 1, 2, 3, 1047198, -523599, 0};
 

@@ -41,15 +41,17 @@ whole() {
     done >>"$scratch/said"
     grep -qE "^(Example: |  )$name" "$scratch/help" || echo "$name --help has no example" >>"$scratch/said"
     [ ! -s "$scratch/said" ]
-    check "whole_$(tr ' -' '__' <<<"$name")" $?
+    local result=$? # before a substitution has its own
+    check "whole_$(tr ' -' '__' <<<"$name")" $result
 }
 
 # walk COMMAND...: all below it
 walk() {
-    local word
+    local word result
     for word in $(subcommands "$@"); do
         completes "$(basename "$1")" "${@:2}" '' | grep -qx -- "$word"
-        check "completion_has_$(tr ' -' '__' <<<"$(basename "$1") ${*:2}")_$word" $?
+        result=$?
+        check "completion_has_$(tr ' -' '__' <<<"$(basename "$1") ${*:2}")_$word" $result
         if [ -n "$(subcommands "$@" "$word")" ]; then walk "$@" "$word"; else whole "$@" "$word"; fi
     done
 }

@@ -92,6 +92,18 @@ static void fault_ends_the_arm(void **state) {
                      COMMAND_NONE); /* a clear does not bring the motion back */
 }
 
+static void silent_board_ends_the_arm(void **state) {
+    struct view_arm arm;
+    (void)state;
+    open_arm(&arm);
+    assert_true(view_arm_take(&arm, "a", 0));
+    assert_true(view_arm_command(&arm, "a", &bend, 0));
+    view_arm_lose(&arm, 1000);
+    assert_false(view_arm_command(&arm, "a", &bend, 2000)); /* no motion when it comes back */
+    assert_int_equal(sent(&arm, SUPERVISOR_SAFE, 3000), COMMAND_VENT);
+    assert_int_equal(arm.end, VIEW_ARM_LOST);
+}
+
 static void vent_comes_from_anybody_at_any_time(void **state) {
     struct view_arm arm;
     (void)state;
@@ -169,6 +181,7 @@ int main(void) {
                                        cmocka_unit_test(silent_page_vents),
                                        cmocka_unit_test(untouched_page_vents),
                                        cmocka_unit_test(fault_ends_the_arm),
+                                       cmocka_unit_test(silent_board_ends_the_arm),
                                        cmocka_unit_test(vent_comes_from_anybody_at_any_time),
                                        cmocka_unit_test(loopback_names_and_addresses),
                                        cmocka_unit_test(origins),

@@ -58,12 +58,25 @@ refuses bend_out_of_bounds 400 'bend_deg.*from 0 to 110' "${command[@]}" '{"page
 refuses bend_that_is_no_number 400 'bend_deg' "${command[@]}" '{"page":"a","bend_deg":"60","direction_deg":0,"co_contraction_kpa":0}'
 refuses number_left_out 400 'direction_deg' "${command[@]}" '{"page":"a","bend_deg":10}'
 refuses command_without_arm 409 'not armed' "${command[@]}" '{"page":"a","bend_deg":10,"direction_deg":0,"co_contraction_kpa":0}'
+# a page whose stream ends loses the arm at once, not when its lease runs out
+curl -sN -m 30 "${address}events?page=watcher&token=$token" >"$scratch/watched" 2>/dev/null &
+watcher=$!
+curl -sN -m 30 "${address}events?page=closer&token=$token" >"$scratch/closer" 2>/dev/null &
+closer=$!
+for _ in $(seq 200); do [ -s "$scratch/closer" ] && break || sleep 0.05; done
+curl -s -H "Authorization: Bearer $token" -d '{"page":"closer"}' "${address}arm" >/dev/null
+kill $closer
+for _ in $(seq 200); do tail -n 3 "$scratch/watched" | grep -q 'was closed\|fell silent' && break || sleep 0.05; done
+tail -n 3 "$scratch/watched" | grep -q 'was closed'
+check closed_stream_takes_the_arm_away $?
+kill $watcher
 for page in 1 2 3 4 5 6 7 8; do
-    curl -sN -m 30 "${address}events?page=$page&token=$token" >"$scratch/stream$page" 2>/dev/null &
+    # 503 is tried again: the server notices a closed stream when it next writes
+    curl -sN -m 60 --retry 30 --retry-delay 1 "${address}events?page=$page&token=$token" >"$scratch/stream$page" 2>/dev/null &
     streams="$streams $!"
 done
 for page in 1 2 3 4 5 6 7 8; do
-    for _ in $(seq 200); do [ -s "$scratch/stream$page" ] && break || sleep 0.05; done
+    for _ in $(seq 200); do grep -q data: "$scratch/stream$page" && break || sleep 0.05; done
 done
 refuses ninth_page 503 'too many pages' "${address}events?page=9&token=$token"
 # shellcheck disable=SC2086

@@ -2,16 +2,19 @@
 
 JOBS := $(shell nproc 2>/dev/null || echo 1)
 
+VERSION := $(shell sed -n 's/.*define TRIBEND_VERSION "\(.*\)"/\1/p' model/program/version.h)
+
 BUILD_PACKAGES := gcc libc6-dev pkg-config libgmsh-dev libsuitesparse-dev libgsl-dev libcyaml-dev libyaml-dev \
                   libopenmpi-dev openmpi-bin zlib1g-dev libjansson-dev libcmocka-dev calculix-ccx gnuplot-nox fonts-dejavu-core \
-                  $(FIRMWARE_PACKAGES) $(EMULATOR_PACKAGES) $(HIL_PACKAGES) $(VIEW_PACKAGES)
+                  $(FIRMWARE_PACKAGES) $(EMULATOR_PACKAGES) $(HIL_PACKAGES) $(LCM_PACKAGES) $(VIEW_PACKAGES)
 FIRMWARE_PACKAGES := gcc-arm-none-eabi libnewlib-arm-none-eabi
 EMULATOR_PACKAGES := libunicorn-dev qemu-system-arm
+LCM_PACKAGES := liblcm-dev liblcm-bin
 HIL_PACKAGES := user-mode-linux can-utils kmod iproute2
 # npm brings the page's plotting library. Who has npm from elsewhere keeps it: Debian's would not go beside it.
 VIEW_PACKAGES := libmicrohttpd-dev $(if $(shell command -v npm),,npm)
 # what `make test` alone needs
-TEST_PACKAGES  := chromium curl mandoc man-db bsdextrautils
+TEST_PACKAGES  := chromium curl mandoc man-db bsdextrautils systemd librsvg2-bin
 LINT_PACKAGES  := clang clang-tidy cppcheck
 
 # --- sources: a folder is a layer; arrows between layers are include paths below
@@ -38,9 +41,13 @@ CAMPAIGN_C := $(filter-out $(TEST_C) $(CAMPAIGN_MAIN),$(wildcard tests/campaign/
 SOLID_C    := $(wildcard tests/model/ccx/*.c)
 BLIND_SCORE_C := $(wildcard tests/gap/blind/blind_score*.c)
 SHARE_C := $(wildcard tests/gap/share/*.c)
+UML_C := $(wildcard tests/hil/uml/*.c)
+# boards for tests of the host: the firmware's node on the simulated HAL
+STUB_C := $(wildcard tests/link/stub/*.c)
+STUB := $(BUILD)/tests/link/stub/board_stub
 BLIND_MAIN := tests/gap/blind/blind_generate.c
 BLIND_C    := $(filter-out $(BLIND_SCORE_C) $(BLIND_MAIN),$(wildcard tests/gap/blind/blind_*.c))
-ALL_C      := $(wildcard docs/examples/*.c) $(FIRMWARE_C) $(SIM_C) $(EMULATOR_C) $(MODEL_C) $(TABLES_CLI_C) $(HOST_C) $(HOST_MAIN) $(EMULATED_C) $(MANUAL_C) $(TEST_C) $(BENCH_C) $(SUPPORT_C) $(CAMPAIGN_C) $(CAMPAIGN_MAIN) $(FAULTS_PAGE_C) $(SOLID_C) $(BLIND_C) $(BLIND_MAIN) $(BLIND_SCORE_C) $(SHARE_C) $(BOARD_C)
+ALL_C      := $(wildcard docs/examples/*.c) $(FIRMWARE_C) $(SIM_C) $(EMULATOR_C) $(MODEL_C) $(TABLES_CLI_C) $(HOST_C) $(HOST_MAIN) $(EMULATED_C) $(MANUAL_C) $(TEST_C) $(BENCH_C) $(SUPPORT_C) $(CAMPAIGN_C) $(CAMPAIGN_MAIN) $(FAULTS_PAGE_C) $(SOLID_C) $(BLIND_C) $(BLIND_MAIN) $(BLIND_SCORE_C) $(SHARE_C) $(STUB_C) $(UML_C) $(BOARD_C)
 ALL_H      := $(wildcard tests/gap/blind/*.h tests/model/ccx/*.h firmware/*.h firmware/*/*.h hal/*.h hal/*/*.h model/*/*.h host/*/*.h tests/*/*.h)
 
 # --- flags
@@ -51,10 +58,22 @@ SANITIZE_FLAGS := $(if $(filter 1,$(SANITIZE)),-fsanitize=address -fsanitize=und
 # No fused multiply-add and no reassociation anywhere: the same inputs give the same bits on every build.
 EXACT := -ffp-contract=off
 INCLUDES := -Ifirmware -Ihal -Imodel -Ihost -Itests
+# what lcm-gen makes of host/lcm
+LCM_INCLUDES := -I$(BUILD)/lcm
 FIRMWARE_FLAGS := -std=c11 $(WARNINGS) -Wdouble-promotion $(EXACT) -fno-math-errno -Ifirmware -Ihal
-COMMON_FLAGS   := -std=gnu11 -D_GNU_SOURCE $(WARNINGS) $(EXACT) $(INCLUDES)
+COMMON_FLAGS   := -std=gnu11 -D_GNU_SOURCE $(WARNINGS) $(EXACT) $(INCLUDES) $(LCM_INCLUDES)
 MPI_FLAGS      := $(patsubst -I%,-isystem %,$(shell pkg-config --cflags-only-I mpi-c 2>/dev/null))
 MODEL_FLAGS    := $(COMMON_FLAGS) -fopenmp $(MPI_FLAGS)
+
+# --- LCM types: code that lcm-gen makes of host/lcm/*.lcm
+LCM_TYPES := $(wildcard host/lcm/*.lcm)
+LCM_C     := $(patsubst host/lcm/%.lcm,$(BUILD)/lcm/%.c,$(LCM_TYPES))
+LCM_O     := $(LCM_C:.c=.o)
+$(LCM_C): $(BUILD)/lcm/%.c: host/lcm/%.lcm
+	@mkdir -p $(@D)
+	@lcm-gen -c --c-cpath $(@D) --c-hpath $(@D) $<
+$(LCM_O): %.o: %.c
+	$(say)$(CC) $(OPTIMISE) $(SANITIZE_FLAGS) -std=gnu11 -w -I$(@D) -c $< -o $@
 
 # --- objects and programs
 object = $(patsubst %.c,$(BUILD)/%.o,$(1))
@@ -64,7 +83,7 @@ EMULATOR_O := $(call object,$(EMULATOR_C))
 MODEL_O    := $(call object,$(MODEL_C))
 SHARED_O    := $(call object,$(SHARED_C))
 TABLES_CLI_O := $(call object,$(TABLES_CLI_C))
-HOST_O     := $(call object,$(HOST_C)) $(BUILD)/host/view/view_files.o
+HOST_O     := $(call object,$(HOST_C)) $(BUILD)/host/view/view_files.o $(LCM_O)
 EMULATED_O := $(call object,$(EMULATED_C))
 SUPPORT_O  := $(call object,$(SUPPORT_C))
 
@@ -76,7 +95,7 @@ SELFTEST_ELF := $(BUILD)/tests/hil/selftest.elf
 BENCH_PROGRAMS := $(patsubst %.c,$(BUILD)/%,$(BENCH_C))
 
 EMULATOR_LIBS = -lunicorn $(HOST_LIBS)
-HOST_LIBS  := -lmicrohttpd -ljansson -lcyaml -lyaml -fopenmp -pthread -lm
+HOST_LIBS  := -llcm -lmicrohttpd -ljansson -lcyaml -lyaml -fopenmp -pthread -lm
 MODEL_LIBS := $(shell pkg-config --libs mpi-c 2>/dev/null) -lgmsh -lcholmod -lgsl -lgslcblas -lcyaml -lyaml -lz -fopenmp -lm
 
 # V=1 shows the commands in full.
@@ -97,6 +116,8 @@ $(BUILD)/tests/campaign/%.o: tests/campaign/%.c
 $(BUILD)/tests/gap/share/%.o: tests/gap/share/%.c
 	@mkdir -p $(@D)
 	$(say)$(CC) $(OPTIMISE) $(SANITIZE_FLAGS) $(MODEL_FLAGS) -MMD -MP -c $< -o $@
+# whoever includes a type's header waits for it to be made
+$(call object,$(wildcard host/lcm/*.c tests/host/test_bridge*.c) $(UML_C)): | $(LCM_C)
 $(BUILD)/%.o: %.c
 	@mkdir -p $(@D)
 	$(say)$(CC) $(OPTIMISE) $(SANITIZE_FLAGS) $(COMMON_FLAGS) -MMD -MP -c $< -o $@
@@ -146,7 +167,7 @@ $(MANUAL): %.bash: %.generate
 -include $(wildcard $(BUILD)/manual/*/*.d)
 
 .PHONY: test-programs bench-programs
-test-programs: $(TEST_PROGRAMS) $(MANUAL) $(BLIND_PROGRAMS) $(BUILD)/tests/campaign/campaign $(BUILD)/tests/docs/faults_page $(SELFTEST_ELF)
+test-programs: $(TEST_PROGRAMS) $(MANUAL) $(BLIND_PROGRAMS) $(BUILD)/tests/campaign/campaign $(BUILD)/tests/docs/faults_page $(STUB) $(BUILD)/tests/hil/uml/mission $(SELFTEST_ELF)
 bench-programs: $(BENCH_PROGRAMS)
 
 # Tests of the model link its libraries; the others link what `tribend` links.
@@ -163,6 +184,11 @@ $(BUILD)/tests/gap/blind/blind_score: $(call object,$(BLIND_SCORE_C))
 # Steps over cores and ranks: the tables' own sweep, which needs MPI.
 $(BUILD)/tests/gap/share/gap_share: $(call object,$(SHARE_C) $(wildcard model/sweep/*.c))
 	$(link) $(shell pkg-config --libs mpi-c 2>/dev/null) -lz -fopenmp
+$(STUB): $(call object,$(STUB_C) tests/support/sim_storage.c) $(HOST_O) $(SIM_O) $(FIRMWARE_O) $(SHARED_O)
+	$(link) $(HOST_LIBS)
+# a commander that has nothing of tribend but the LCM types
+$(BUILD)/tests/hil/uml/mission: $(call object,$(UML_C)) $(LCM_O)
+	$(link) -llcm
 $(BUILD)/tests/docs/faults_page: $(call object,$(FAULTS_PAGE_C)) $(FIRMWARE_O)
 	$(link) -lm
 $(BUILD)/tests/campaign/test_campaign: $(call object,$(CAMPAIGN_C))
@@ -230,14 +256,14 @@ lint-board:
 	    $$c $(FIRMWARE_FLAGS) -c $$f -o /dev/null || { echo "lint: $$c rejects $$f"; exit 1; }; done; done
 lint-misra:
 	@JOBS=$(JOBS) tests/tools/misra $(BUILD)
-lint-clang:
+lint-clang: $(LCM_C)
 	@set -e; for f in $(HOST_SIDE_C); do clang -O1 $(COMMON_FLAGS) $(MPI_FLAGS) -Wno-unknown-pragmas -Wno-source-uses-openmp \
 	    -fopenmp -fsyntax-only $$f; done
 lint-cppcheck:
 	@cppcheck -j$(JOBS) $(CPPCHECK_FLAGS) $(FIRMWARE_C) $(BOARD_C) $(SIM_C) $(EMULATOR_C) $(MODEL_C) $(TABLES_CLI_C) $(HOST_C) $(HOST_MAIN) $(EMULATED_C) $(MANUAL_C)
 # one file at a time: with several, clang-tidy 14 takes every va_list for uninitialised
 tidy = printf '%s\n' $(1) | xargs -P $(JOBS) -I FILE clang-tidy --quiet FILE -- $(2) 2>/dev/null
-lint-tidy:
+lint-tidy: $(LCM_C)
 	@$(call tidy,$(FIRMWARE_C),$(FIRMWARE_FLAGS))
 	@$(call tidy,$(BOARD_C),$(FIRMWARE_FLAGS) $(BOARD_CLANG))
 	@$(call tidy,$(SIM_C) $(EMULATOR_C) $(MODEL_C) $(TABLES_CLI_C) $(HOST_C) $(HOST_MAIN) $(EMULATED_C) $(MANUAL_C),$(COMMON_FLAGS) $(MPI_FLAGS) \

@@ -1,0 +1,105 @@
+/* tribend clear: leave FAULT on purpose. Only what was seen here is cleared: a fault that comes meanwhile
+ * stays. */
+#include <stdio.h>
+#include <string.h>
+
+#include "cli/commands.h"
+#include "comms/node.h"
+
+#define WITHIN_US 1500000
+#define AGAIN_US 300000
+#define WORDS_BYTES 512
+
+static error_t parse(int key, char *argument, struct argp_state *state) {
+    switch (key) {
+    case ARGP_KEY_INIT:
+        state->child_inputs[0] = state->input;
+        return 0;
+    case ARGP_KEY_ARG:
+        argp_error(state, "clear takes no argument, '%s' is too much", argument);
+        return 0;
+    default:
+        return ARGP_ERR_UNKNOWN;
+    }
+}
+
+static const struct argp_child children[] = {{&bus_options_parser, 0, NULL, 1}, {0}};
+static const struct argp parser = {
+    NULL,
+    parse,
+    "",
+    "Leave FAULT, if the cause of each latched fault is gone. The module stays vented until the "
+    "next command.\v"
+    "Example: tribend clear --bus can0",
+    children,
+    NULL,
+    NULL};
+
+static void send_clear(struct bus *bus, uint32_t faults) {
+    const struct controller_command command = {.kind = COMMAND_CLEAR};
+    const union message message = {.clear = {.key = MESSAGE_CLEAR_KEY, .faults = faults}};
+    if (bus->can != NULL) {
+        (void)can_link_post(bus->can, MESSAGE_CLEAR, &message);
+    } else {
+        (void)bus->link.send(bus->link.context, &command);
+    }
+}
+
+static int still_there(uint32_t faults) {
+    char words[WORDS_BYTES];
+    cli_describe_faults(faults, words, sizeof words);
+    (void)program_fail(EXIT_REFUSED, "the controller stays in FAULT: %s", words);
+    for (int f = 0; f < (int)FAULT_COUNT; f++) {
+        if ((faults & (1u << (unsigned)f)) != 0u) {
+            const struct supervisor_fault_row *row = supervisor_fault_describe((enum supervisor_fault)f);
+            fprintf(stderr, "  %s\n    cleared when  %s\n    remedy        %s\n", row->name, row->clear,
+                    row->remedy);
+        }
+    }
+    return EXIT_REFUSED;
+}
+
+static int clear(struct bus *bus, const struct bus_options *options) {
+    struct link_report report;
+    char words[WORDS_BYTES];
+    if (!bus->link.receive(bus->link.context, &report)) {
+        return bus_gone(bus, options);
+    }
+    const uint32_t faults = report.status.faults;
+    const int64_t start_us = report.time_us;
+    if (report.status.state != SUPERVISOR_FAULT) {
+        printf("nothing to clear: state %s\n", supervisor_state_name(report.status.state));
+        return EXIT_OK;
+    }
+    for (int64_t again_us = start_us; report.time_us < start_us + WITHIN_US;) {
+        if (report.time_us >= again_us) {
+            again_us = report.time_us + AGAIN_US;
+            send_clear(bus, faults);
+        }
+        if (!bus->link.receive(bus->link.context, &report)) {
+            return bus_gone(bus, options);
+        }
+        if (report.status.state == SUPERVISOR_SAFE) {
+            cli_describe_faults(faults, words, sizeof words);
+            printf("cleared   %s; state SAFE, vented\n", words);
+            return EXIT_OK;
+        }
+    }
+    return still_there(report.status.faults);
+}
+
+int cli_clear(int argc, char **argv) {
+    static struct bus bus;
+    struct bus_options options;
+    bus_options_init(&options);
+    argp_err_exit_status = EXIT_USAGE;
+    if (argp_parse(&parser, argc, argv, 0, NULL, &options) != 0) {
+        return EXIT_USAGE;
+    }
+    int code = bus_open(&bus, &options);
+    if (code == EXIT_OK) {
+        code = clear(&bus, &options);
+        bus_close(&bus);
+    }
+    return code;
+}

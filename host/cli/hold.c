@@ -1,0 +1,102 @@
+/* tribend hold: take over a motion that another host began, and keep its pressures until Ctrl-C; then vent.
+ */
+#include <stdio.h>
+#include <string.h>
+
+#include "cli/commands.h"
+
+#define WITHIN_US 1000000
+
+static error_t parse(int key, char *argument, struct argp_state *state) {
+    switch (key) {
+    case ARGP_KEY_INIT:
+        state->child_inputs[0] = state->input;
+        return 0;
+    case ARGP_KEY_ARG:
+        argp_error(state, "hold takes no argument, '%s' is too much", argument);
+        return 0;
+    default:
+        return ARGP_ERR_UNKNOWN;
+    }
+}
+
+static const struct argp_child children[] = {{&bus_options_parser, 0, NULL, 1}, {0}};
+static const struct argp parser = {
+    NULL,
+    parse,
+    "",
+    "Keep the pressures that the module has now, which another host commanded, until --for is "
+    "over or Ctrl-C; then vent. The other host's commands are refused from then on.\v"
+    "Example: tribend hold --bus can0 --for 60s",
+    children,
+    NULL,
+    NULL};
+
+static bool moves(enum supervisor_state state) {
+    return state == SUPERVISOR_ACTIVE || state == SUPERVISOR_HOLD;
+}
+
+/* Until it is over or cannot be; an exit code. */
+static int hold(struct bus *bus, const struct bus_options *options, struct link_report *report) {
+    const struct controller_command command = {.kind = COMMAND_HOLD};
+    const int64_t start_us = report->time_us, end_us = start_us + (int64_t)(1e6 * options->duration_s);
+    bool held = false;
+    while (report->time_us < end_us && program_interrupted == 0) {
+        if (!bus->link.send(bus->link.context, &command) || !bus->link.receive(bus->link.context, report)) {
+            return bus_gone(bus, options);
+        }
+        if (report->status.state == SUPERVISOR_FAULT) {
+            return program_fail(EXIT_FAULT,
+                                "the controller went to FAULT and vented (tribend status says why)");
+        }
+        if (!held && report->status.state == SUPERVISOR_HOLD) {
+            held = true;
+            printf("holding   %.3f %.3f %.3f kPa; Ctrl-C vents\n", 1e-3 * (double)report->pressure_pa[0],
+                   1e-3 * (double)report->pressure_pa[1], 1e-3 * (double)report->pressure_pa[2]);
+            (void)fflush(stdout);
+        }
+        if (!moves(report->status.state) || (!held && report->time_us > start_us + WITHIN_US)) {
+            return program_fail(EXIT_REFUSED, "the controller is in %s and does not hold",
+                                supervisor_state_name(report->status.state));
+        }
+    }
+    return program_interrupted == 0 ? EXIT_OK : EXIT_INTERRUPTED;
+}
+
+static int run(struct bus *bus, const struct bus_options *options) {
+    const struct controller_command vent = {.kind = COMMAND_VENT};
+    struct link_report report;
+    if (!bus->link.receive(bus->link.context, &report)) {
+        return bus_gone(bus, options);
+    }
+    if (!moves(report.status.state)) {
+        return program_fail(EXIT_REFUSED, "there is nothing to hold: the controller is in %s",
+                            supervisor_state_name(report.status.state));
+    }
+    program_catch_interrupt();
+    const int code = hold(bus, options, &report);
+    (void)bus->link.send(bus->link.context, &vent);
+    while (code != EXIT_BUS && moves(report.status.state) && bus->link.receive(bus->link.context, &report)) {
+    }
+    if (code == EXIT_OK || code == EXIT_INTERRUPTED) {
+        printf("venting   state %s\n", supervisor_state_name(report.status.state));
+    }
+    return code;
+}
+
+int cli_hold(int argc, char **argv) {
+    static struct bus bus;
+    struct bus_options options;
+    bus_options_init(&options);
+    options.duration_s = 86400.0;
+    argp_err_exit_status = EXIT_USAGE;
+    if (argp_parse(&parser, argc, argv, 0, NULL, &options) != 0) {
+        return EXIT_USAGE;
+    }
+    int code = bus_open(&bus, &options);
+    if (code == EXIT_OK) {
+        code = run(&bus, &options);
+        bus_close(&bus);
+    }
+    return code;
+}

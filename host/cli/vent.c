@@ -1,0 +1,76 @@
+/* tribend vent: vent all chambers. Sent before anything else is looked at: every version of a board obeys it.
+ */
+#include <stdio.h>
+#include <string.h>
+
+#include "cli/commands.h"
+
+#define VENT_WITHIN_US 10000000
+#define VENTED_PA 500.0f
+
+static error_t parse(int key, char *argument, struct argp_state *state) {
+    switch (key) {
+    case ARGP_KEY_INIT:
+        state->child_inputs[0] = state->input;
+        return 0;
+    case ARGP_KEY_ARG:
+        argp_error(state, "vent takes no argument, '%s' is too much", argument);
+        return 0;
+    default:
+        return ARGP_ERR_UNKNOWN;
+    }
+}
+
+static const struct argp_child children[] = {{&bus_options_parser, 0, NULL, 1}, {0}};
+static const struct argp parser = {NULL,
+                                   parse,
+                                   "",
+                                   "Vent all chambers, whatever else goes on, and watch the pressures go.\v"
+                                   "Example: tribend vent --bus can0",
+                                   children,
+                                   NULL,
+                                   NULL};
+
+static bool is_vented(const struct link_report *report) {
+    const float *pressure_pa = report->status.pressure_estimate_pa;
+    return pressure_pa[0] < VENTED_PA && pressure_pa[1] < VENTED_PA && pressure_pa[2] < VENTED_PA &&
+           report->status.state != SUPERVISOR_ACTIVE && report->status.state != SUPERVISOR_HOLD;
+}
+
+static int vent(struct bus *bus, const struct bus_options *options) {
+    const struct controller_command command = {.kind = COMMAND_VENT};
+    struct link_report report;
+    int64_t start_us = -1;
+    (void)bus->link.send(bus->link.context, &command);
+    do {
+        if (!bus->link.receive(bus->link.context, &report)) {
+            return bus_gone(bus, options);
+        }
+        start_us = start_us < 0 ? report.time_us : start_us;
+        if (is_vented(&report)) {
+            printf("vented    in %.2f s, state %s\n", 1e-6 * (double)(report.time_us - start_us),
+                   supervisor_state_name(report.status.state));
+            return EXIT_OK;
+        }
+    } while (report.time_us < start_us + VENT_WITHIN_US);
+    return program_fail(
+        EXIT_FAULT, "the chambers did not vent: %.0f, %.0f, %.0f Pa left: shut the supply off by hand",
+        (double)report.pressure_pa[0], (double)report.pressure_pa[1], (double)report.pressure_pa[2]);
+}
+
+int cli_vent(int argc, char **argv) {
+    static struct bus bus;
+    struct bus_options options;
+    bus_options_init(&options);
+    options.vent_at_once = true;
+    argp_err_exit_status = EXIT_USAGE;
+    if (argp_parse(&parser, argc, argv, 0, NULL, &options) != 0) {
+        return EXIT_USAGE;
+    }
+    int code = bus_open(&bus, &options);
+    if (code == EXIT_OK) {
+        code = vent(&bus, &options);
+        bus_close(&bus);
+    }
+    return code;
+}

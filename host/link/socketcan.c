@@ -1,0 +1,163 @@
+#include "link/socketcan.h"
+
+#include <errno.h>
+#include <linux/can/error.h>
+#include <linux/can/raw.h>
+#include <net/if.h>
+#include <stdio.h>
+#include <string.h>
+#include <sys/ioctl.h>
+#include <sys/socket.h>
+#include <time.h>
+#include <unistd.h>
+
+#define RECEIVE_BUFFER_BYTES (4 << 20) /* some seconds of a full bus */
+#define CONTROL_BYTES 256
+
+bool socketcan_to_frame(const struct canfd_frame *can, size_t size, struct transport_frame *frame) {
+    const bool fd = size == CANFD_MTU;
+    memset(frame, 0, sizeof *frame);
+    if ((!fd && size != CAN_MTU) || can->len > (fd ? CANFD_MAX_DLEN : CAN_MAX_DLEN)) {
+        return false;
+    }
+    frame->is_error = (can->can_id & CAN_ERR_FLAG) != 0;
+    frame->error_class = frame->is_error ? can->can_id & CAN_ERR_MASK : 0;
+    frame->frame =
+        (struct hal_can_frame){.extended = (can->can_id & CAN_EFF_FLAG) != 0, .fd = fd, .length = can->len};
+    frame->frame.id = can->can_id & (frame->frame.extended ? CAN_EFF_MASK : CAN_SFF_MASK);
+    memcpy(frame->frame.data, can->data, can->len);
+    return frame->is_error || (can->can_id & CAN_RTR_FLAG) == 0;
+}
+
+size_t socketcan_from_frame(const struct hal_can_frame *frame, struct canfd_frame *can) {
+    memset(can, 0, sizeof *can);
+    can->can_id = frame->id | (frame->extended ? CAN_EFF_FLAG : 0u);
+    can->len = frame->length;
+    memcpy(can->data, frame->data, frame->length);
+    return frame->fd ? CANFD_MTU : CAN_MTU;
+}
+
+/* Reception time and the kernel's count of what it dropped. */
+static void read_control(struct transport *transport, struct msghdr *message, struct transport_frame *frame) {
+    for (struct cmsghdr *control = CMSG_FIRSTHDR(message); control != NULL;
+         control = CMSG_NXTHDR(message, control)) {
+        if (control->cmsg_level != SOL_SOCKET) {
+            continue;
+        }
+        if (control->cmsg_type == SCM_TIMESTAMPNS) {
+            struct timespec time;
+            memcpy(&time, CMSG_DATA(control), sizeof time);
+            frame->time_us = (int64_t)time.tv_sec * 1000000 + time.tv_nsec / 1000;
+        } else if (control->cmsg_type == SO_RXQ_OVFL) {
+            uint32_t dropped = 0;
+            memcpy(&dropped, CMSG_DATA(control), sizeof dropped);
+            transport->overflowed += dropped - transport->overflow_seen;
+            transport->overflow_seen = dropped;
+        }
+    }
+}
+
+static enum transport_result receive(struct transport *transport, struct transport_frame *frame) {
+    struct canfd_frame can;
+    union {
+        char bytes[CONTROL_BYTES];
+        struct cmsghdr align;
+    } control;
+    for (;;) {
+        struct iovec part = {.iov_base = &can, .iov_len = sizeof can};
+        struct msghdr message = {.msg_iov = &part,
+                                 .msg_iovlen = 1,
+                                 .msg_control = control.bytes,
+                                 .msg_controllen = sizeof control.bytes};
+        const ssize_t size = recvmsg(transport->descriptor, &message, 0);
+        if (size < 0 && errno == EINTR) {
+            continue;
+        }
+        if (size < 0) {
+            return errno == EAGAIN ? TRANSPORT_NOTHING : TRANSPORT_GONE;
+        }
+        const bool ours = socketcan_to_frame(&can, (size_t)size, frame);
+        frame->time_us = transport_now_us();
+        read_control(transport, &message, frame);
+        if (ours) {
+            return TRANSPORT_DONE;
+        }
+        transport->malformed++;
+    }
+}
+
+static enum transport_result send_frame(struct transport *transport, const struct hal_can_frame *frame) {
+    struct canfd_frame can;
+    const size_t size = socketcan_from_frame(frame, &can);
+    for (;;) {
+        const ssize_t sent = send(transport->descriptor, &can, size, MSG_NOSIGNAL);
+        if (sent == (ssize_t)size) {
+            return TRANSPORT_DONE;
+        }
+        if (sent < 0 && errno != EINTR) {
+            return errno == EAGAIN || errno == ENOBUFS ? TRANSPORT_NOTHING : TRANSPORT_GONE;
+        }
+    }
+}
+
+static void close_socket(struct transport *transport) {
+    (void)close(transport->descriptor);
+}
+
+static bool refuse(const char *interface, const char *what, char *error, size_t error_bytes) {
+    (void)snprintf(error, error_bytes, "bus %s: %s: %s", interface, what, strerror(errno));
+    return false;
+}
+
+/* What is asked for before binding. A kernel that cannot do one of them leaves it out. */
+static void set_options(int descriptor) {
+    const int on = 1, bytes = RECEIVE_BUFFER_BYTES;
+    const can_err_mask_t errors = CAN_ERR_MASK;
+    (void)setsockopt(descriptor, SOL_CAN_RAW, CAN_RAW_ERR_FILTER, &errors, sizeof errors);
+    (void)setsockopt(descriptor, SOL_SOCKET, SO_TIMESTAMPNS, &on, sizeof on);
+    (void)setsockopt(descriptor, SOL_SOCKET, SO_RXQ_OVFL, &on, sizeof on);
+    if (setsockopt(descriptor, SOL_SOCKET, SO_RCVBUFFORCE, &bytes, sizeof bytes) != 0) {
+        (void)setsockopt(descriptor, SOL_SOCKET, SO_RCVBUF, &bytes, sizeof bytes);
+    }
+    (void)setsockopt(descriptor, SOL_CAN_RAW, CAN_RAW_FD_FRAMES, &on, sizeof on);
+}
+
+bool socketcan_open(struct transport *transport, const char *interface, char *error, size_t error_bytes) {
+    struct ifreq request;
+    struct sockaddr_can address = {.can_family = AF_CAN, .can_ifindex = (int)if_nametoindex(interface)};
+    if (address.can_ifindex == 0) {
+        (void)snprintf(
+            error, error_bytes,
+            "there is no bus '%s': %s. There are sim, unix:PATH, slcan:DEVICE, and the CAN interfaces that "
+            "`ip link` lists (a virtual one, as root: ip link add dev vcan0 type vcan)",
+            interface, strerror(errno));
+        return false;
+    }
+    transport->descriptor = socket(PF_CAN, SOCK_RAW | SOCK_NONBLOCK | SOCK_CLOEXEC, CAN_RAW);
+    if (transport->descriptor < 0) {
+        return refuse(interface,
+                      "no CAN socket (as root: modprobe can_raw; or use unix:PATH or slcan:DEVICE)", error,
+                      error_bytes);
+    }
+    transport->receive = receive;
+    transport->send = send_frame;
+    transport->close = close_socket;
+    memset(&request, 0, sizeof request);
+    (void)snprintf(request.ifr_name, sizeof request.ifr_name, "%s", interface);
+    if (ioctl(transport->descriptor, SIOCGIFFLAGS, &request) != 0) {
+        return refuse(interface, "its state cannot be read", error, error_bytes);
+    }
+    if ((request.ifr_flags & IFF_UP) == 0) {
+        errno = ENETDOWN;
+        return refuse(
+            interface,
+            "the interface is down (as root: ip link set NAME up type can bitrate 1000000; a vcan: ip link "
+            "set NAME up)",
+            error, error_bytes);
+    }
+    set_options(transport->descriptor);
+    if (bind(transport->descriptor, (const struct sockaddr *)&address, sizeof address) != 0) {
+        return refuse(interface, "this is no CAN interface", error, error_bytes);
+    }
+    return true;
+}

@@ -1,0 +1,14 @@
+/* Between frames of linux/can.h and hal.h, for sockets that carry the former. */
+#ifndef TRIBEND_SOCKETCAN_H
+#define TRIBEND_SOCKETCAN_H
+
+#include <linux/can.h>
+
+#include "link/transport.h"
+
+/* `size` is what was read. False: no frame that can carry one of our messages. */
+bool socketcan_to_frame(const struct canfd_frame *can, size_t size, struct transport_frame *frame);
+/* Returns the bytes to write. */
+size_t socketcan_from_frame(const struct hal_can_frame *frame, struct canfd_frame *can);
+
+#endif
