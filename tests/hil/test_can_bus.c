@@ -122,8 +122,7 @@ static void no_frame_is_longer_than_its_worst_case(void **state) {
     for (uint32_t i = 0; i < 2000; i++) {
         struct can_bus_frame frame = {.frame = {.id = i % 0x800u, .length = 8}};
         for (uint32_t k = 0; k < 8; k++) {
-            frame.frame.data[k] =
-                i % 2u == 0 ? (uint8_t)(i / 256u * 0xffu) : (uint8_t)(i * 2654435761u >> (3u * k));
+            frame.frame.data[k] = (uint8_t)(i % 2u == 0 ? i / 256u * 0xffu : i * 2654435761u >> (3u * k));
         }
         const int64_t bits = can_bus_frame_ticks(&frame, 1, 1);
         longest = bits > longest ? bits : longest;
