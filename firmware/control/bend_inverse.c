@@ -140,7 +140,8 @@ static uint32_t lead_of(const float toward[2]) {
 }
 
 static void rest(struct bend_inverse *inverse) {
-    inverse->pressure_pa[0] = inverse->pressure_pa[1] = inverse->plane.floor_pa;
+    inverse->pressure_pa[0] = inverse->plane.floor_pa;
+    inverse->pressure_pa[1] = inverse->plane.floor_pa;
     inverse->stage = BEND_INVERSE_REST;
 }
 
@@ -154,8 +155,12 @@ void bend_inverse_begin(struct bend_inverse *inverse, const struct bend_table *t
     inverse->flags = finite ? 0u : (uint32_t)BEND_INVERSE_NOT_FINITE;
     inverse->flags |= finite && size_rad > limit_rad ? (uint32_t)BEND_INVERSE_LIMITED_BEND : 0u;
     inverse->flags |= floor_pa > inverse->ceiling_pa ? (uint32_t)BEND_INVERSE_LIMITED_CO_CONTRACTION : 0u;
-    inverse->evaluations = inverse->edge_evaluations = inverse->steps = 0u;
-    inverse->turned = inverse->cornered = inverse->found = false;
+    inverse->evaluations = 0u;
+    inverse->edge_evaluations = 0u;
+    inverse->steps = 0u;
+    inverse->turned = false;
+    inverse->cornered = false;
+    inverse->found = false;
     inverse->length_m = table->module.active_length_m;
     inverse->wanted = bends ? real_min(size_rad, limit_rad) / inverse->length_m : 0.0f;
     inverse->toward[0] = bends ? bend_rad[0] / size_rad : 1.0f;

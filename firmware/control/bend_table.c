@@ -144,8 +144,10 @@ static enum bend_table_status bind_axes(struct bend_table *table, bool volume_fi
     }
     table->axes_alike = true;
     for (size_t a = 1; a < 3; a++) {
-        table->axes_alike = table->axes_alike && table->nodes[a] == table->nodes[0] &&
-                            memcmp(table->axis_pa[a], table->axis_pa[0], table->nodes[0] * sizeof(float)) == 0;
+        table->axes_alike = table->axes_alike && table->nodes[a] == table->nodes[0];
+        for (size_t i = 0; i < table->nodes[a] && table->axes_alike; i++) {
+            table->axes_alike = table->axis_pa[a][i] - table->axis_pa[0][i] == 0.0f;
+        }
     }
     return status;
 }

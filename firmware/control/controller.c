@@ -524,14 +524,16 @@ static void aim(struct controller *controller, bool may_look) {
             status->pressure_target_pa[c] = 0.0f;
         }
         status->inverse.flags = 0u;
-        controller->inverting = controller->targets_stale = false;
+        controller->inverting = false;
+        controller->targets_stale = false;
     } else if (controller->active.kind == COMMAND_BEND) {
         if (may_look && (controller->targets_stale || controller->inverting)) {
             aim_at_bend(controller);
         }
     } else if (may_look && controller->targets_stale) {
         aim_at_pressures(controller);
-        controller->inverting = controller->targets_stale = false;
+        controller->inverting = false;
+        controller->targets_stale = false;
     }
 }
 

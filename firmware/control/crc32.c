@@ -1,9 +1,5 @@
 #include "control/crc32.h"
 
-#include <string.h>
-
-_Static_assert(__BYTE_ORDER__ == __ORDER_LITTLE_ENDIAN__, "words are taken in little-endian byte order");
-
 /* [k]: remainder of each byte times x^(32 + 8 k), polynomial 0x04c11db7 reflected: four bytes are taken at once (Kounavis
  * and Berry 2005). tests/firmware/test_crc32.c computes them anew. */
 static const uint32_t remainder_of[4][256] = {
@@ -144,9 +140,7 @@ uint32_t crc32_update(uint32_t crc, const void *bytes, size_t size) {
     const uint8_t *byte = bytes;
     crc = ~crc;
     for (; size >= 4u; size -= 4u, byte += 4) {
-        uint32_t word = 0u;
-        (void)memcpy(&word, byte, sizeof word);
-        crc ^= word;
+        crc ^= (uint32_t)byte[0] | (uint32_t)byte[1] << 8 | (uint32_t)byte[2] << 16 | (uint32_t)byte[3] << 24;
         crc = remainder_of[3][crc & 255u] ^ remainder_of[2][(crc >> 8) & 255u] ^ remainder_of[1][(crc >> 16) & 255u] ^
               remainder_of[0][crc >> 24];
     }
