@@ -69,6 +69,8 @@ int main(int argc, char **argv) {
     parameters.sensor_watch.noise_most_pa = 1e9f;
     parameters.flow_watch.most_pa = 1e9f;
     parameters.flow_watch.missing_pa = 1e9f;
+    parameters.flow_watch.steady_pa = 1e9f;
+    parameters.tip_watch.over_rad = 10.0f;
     parameters.tip_watch.excess_rad = 10.0f;
     parameters.tip_watch.jump_rad = 3.0f;
     controller_init(&controller, &table, &parameters);
