@@ -105,26 +105,37 @@ uint32_t message_identifier(enum message_id id, uint32_t node) {
     return (uint32_t)rows[id].number << MESSAGE_NODE_BITS | node;
 }
 
-/* --- bits */
+/* --- bits: in words of 32, which are the data as they are in memory (little-endian) */
 
-/* Into `data` that is zero there. */
-static void put_bits(uint8_t *data, uint32_t start, uint32_t bits, uint64_t raw) {
-    uint32_t at = start / 8u, shift = start % 8u, done = 8u - shift;
-    data[at] = (uint8_t)(data[at] | (uint8_t)(raw << shift));
-    for (; done < bits; done += 8u) {
-        at++;
-        data[at] = (uint8_t)(data[at] | (uint8_t)(raw >> done));
+_Static_assert(__BYTE_ORDER__ == __ORDER_LITTLE_ENDIAN__,
+               "words are data, and the low bytes of a member come first");
+
+#define WORD_BITS 32u
+#define WORD_BYTES 4u
+#define WORDS (HAL_CAN_DATA_BYTES / WORD_BYTES)
+
+static uint32_t low_bits(uint32_t bits) {
+    return bits < WORD_BITS ? (1u << bits) - 1u : UINT32_MAX;
+}
+
+/* At most 32 bits, into words that are zero there. */
+static void put_bits(uint32_t *words, uint32_t start, uint32_t bits, uint32_t raw) {
+    uint32_t *word = &words[start / WORD_BITS];
+    const uint32_t shift = start % WORD_BITS;
+    word[0] |= raw << shift;
+    if (shift + bits > WORD_BITS) {
+        word[1] |= raw >> (WORD_BITS - shift); /* then shift is not 0 */
     }
 }
 
-static uint64_t get_bits(const uint8_t *data, uint32_t start, uint32_t bits) {
-    uint32_t at = start / 8u, shift = start % 8u, done = 8u - shift;
-    uint64_t raw = (uint64_t)data[at] >> shift;
-    for (; done < bits; done += 8u) {
-        at++;
-        raw |= (uint64_t)data[at] << done;
+static uint32_t get_bits(const uint32_t *words, uint32_t start, uint32_t bits) {
+    const uint32_t *word = &words[start / WORD_BITS];
+    const uint32_t shift = start % WORD_BITS;
+    uint32_t raw = word[0] >> shift;
+    if (shift + bits > WORD_BITS) {
+        raw |= word[1] << (WORD_BITS - shift);
     }
-    return bits < 64u ? raw & (((uint64_t)1u << bits) - 1u) : raw;
+    return raw & low_bits(bits);
 }
 
 /* --- fields */
@@ -148,15 +159,67 @@ static int32_t quantise(const struct message_field *field, float value, struct m
     return steps < (float)field->least ? field->least : field->most;
 }
 
-static uint64_t read_whole(const struct message_field *field, const uint8_t *member,
-                           struct message_trouble *trouble) {
-    uint64_t value = 0u; /* little-endian: the low bytes come first */
-    (void)memcpy(&value, member, field->width);
-    if (field->bits < 64u && value >> field->bits != 0u) {
-        trouble->out_of_range++;
-        value = ((uint64_t)1u << field->bits) - 1u;
+static void pack_real(const struct message_field *field, const uint8_t *member, uint32_t *words,
+                      struct message_trouble *trouble) {
+    float value = 0.0f;
+    (void)memcpy(&value, member, sizeof value);
+    put_bits(words, field->start, field->bits,
+             (uint32_t)quantise(field, value, trouble) & low_bits(field->bits));
+}
+
+/* Members of 1, 2 and 4 bytes: copies of a known size, which are loads. */
+static uint32_t read_whole(const uint8_t *member, uint32_t width) {
+    uint32_t value = member[0];
+    uint16_t half = 0u;
+    if (width == sizeof half) {
+        (void)memcpy(&half, member, sizeof half);
+        value = half;
+    } else if (width == sizeof value) {
+        (void)memcpy(&value, member, sizeof value);
     }
     return value;
+}
+
+static void write_whole(uint8_t *member, uint32_t width, uint32_t value) {
+    const uint16_t half = (uint16_t)value;
+    if (width == sizeof half) {
+        (void)memcpy(member, &half, sizeof half);
+    } else if (width == sizeof value) {
+        (void)memcpy(member, &value, sizeof value);
+    } else {
+        member[0] = (uint8_t)value; /* a bool, too: its field has one bit */
+    }
+}
+
+static void pack_whole(const struct message_field *field, const uint8_t *member, uint32_t *words,
+                       struct message_trouble *trouble) {
+    const uint32_t value = read_whole(member, field->width), most = low_bits(field->bits);
+    trouble->out_of_range += value > most ? 1u : 0u;
+    put_bits(words, field->start, field->bits, value > most ? most : value);
+}
+
+/* Members of 8 bytes, whose fields have over 32 bits. */
+static void pack_wide(const struct message_field *field, const uint8_t *member, uint32_t *words,
+                      struct message_trouble *trouble) {
+    const uint32_t high_bits = field->bits - WORD_BITS, most = low_bits(high_bits);
+    uint32_t low = read_whole(member, WORD_BYTES), high = read_whole(member + WORD_BYTES, WORD_BYTES);
+    if (high > most) {
+        trouble->out_of_range++;
+        high = most;
+        low = UINT32_MAX;
+    }
+    put_bits(words, field->start, WORD_BITS, low);
+    put_bits(words, field->start + WORD_BITS, high_bits, high);
+}
+
+static void unpack_whole(const struct message_field *field, const uint32_t *words, uint8_t *member) {
+    if (field->bits <= WORD_BITS) {
+        write_whole(member, field->width, get_bits(words, field->start, field->bits));
+    } else {
+        write_whole(member, WORD_BYTES, get_bits(words, field->start, WORD_BITS));
+        write_whole(member + WORD_BYTES, WORD_BYTES,
+                    get_bits(words, field->start + WORD_BITS, field->bits - WORD_BITS));
+    }
 }
 
 static void unpack_real(const struct message_field *field, uint32_t raw, uint8_t *member,
@@ -178,32 +241,36 @@ static void unpack_real(const struct message_field *field, uint32_t raw, uint8_t
 
 void message_pack(enum message_id id, const void *message, uint8_t *data, struct message_trouble *trouble) {
     const struct message_row *row = &rows[id];
+    const struct message_field *field = &fields[row->first_field], *end = field + row->fields;
     const uint8_t *members = message;
-    (void)memset(data, 0, row->bytes);
-    for (uint32_t f = row->first_field; f < (uint32_t)row->first_field + row->fields; f++) {
-        const struct message_field *field = &fields[f];
-        uint64_t raw = 0u;
-        if (field->kind == MESSAGE_FIELD_REAL) {
-            float value = 0.0f;
-            (void)memcpy(&value, members + field->at, sizeof value);
-            raw = (uint32_t)quantise(field, value, trouble) & ((1u << field->bits) - 1u);
-        } else {
-            raw = read_whole(field, members + field->at, trouble);
-        }
-        put_bits(data, field->start, field->bits, raw);
+    uint32_t words[WORDS];
+    for (uint32_t w = 0; w * WORD_BYTES < row->bytes; w++) {
+        words[w] = 0u;
     }
+    for (; field < end; field++) {
+        if (field->kind == MESSAGE_FIELD_REAL) {
+            pack_real(field, members + field->at, words, trouble);
+        } else if (field->bits <= WORD_BITS) {
+            pack_whole(field, members + field->at, words, trouble);
+        } else {
+            pack_wide(field, members + field->at, words, trouble);
+        }
+    }
+    (void)memcpy(data, words, row->bytes);
 }
 
 void message_unpack(enum message_id id, const uint8_t *data, void *message, struct message_trouble *trouble) {
     const struct message_row *row = &rows[id];
+    const struct message_field *field = &fields[row->first_field], *end = field + row->fields;
     uint8_t *members = message;
-    for (uint32_t f = row->first_field; f < (uint32_t)row->first_field + row->fields; f++) {
-        const struct message_field *field = &fields[f];
-        const uint64_t raw = get_bits(data, field->start, field->bits);
+    uint32_t words[WORDS];
+    words[(row->bytes - 1u) / WORD_BYTES] = 0u; /* the last may not be full */
+    (void)memcpy(words, data, row->bytes);
+    for (; field < end; field++) {
         if (field->kind == MESSAGE_FIELD_REAL) {
-            unpack_real(field, (uint32_t)raw, members + field->at, trouble);
+            unpack_real(field, get_bits(words, field->start, field->bits), members + field->at, trouble);
         } else {
-            (void)memcpy(members + field->at, &raw, field->width);
+            unpack_whole(field, words, members + field->at);
         }
     }
 }

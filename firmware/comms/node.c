@@ -497,19 +497,28 @@ static bool send_report(struct node *node, enum report_index report) {
     return true;
 }
 
+/* The next one in turn from `from` on. */
+static uint32_t next_pending(uint32_t pending, uint32_t from) {
+    const uint32_t later = pending & ~((1u << from) - 1u);
+    return (uint32_t)__builtin_ctz(later != 0u ? later : pending);
+}
+
+/* A long frame takes as long to build as two short ones. */
+static uint32_t effort_of(enum report_index report) {
+    return report == REPORT_TELEMETRY ? NODE_REPORTS_A_STEP : 1u;
+}
+
 static void send_reports(struct node *node) {
-    uint32_t sent = 0u, report = node->next_report;
-    for (uint32_t i = 0; i < (uint32_t)REPORT_COUNT && sent < NODE_REPORTS_A_STEP && node->pending != 0u;
-         i++) {
-        if (is_pending(node, (enum report_index)report)) {
-            if (!send_report(node, (enum report_index)report)) {
-                break;
-            }
-            sent++;
+    uint32_t sent = 0u;
+    while (sent < NODE_REPORTS_A_STEP && node->pending != 0u) {
+        const uint32_t report = next_pending(node->pending, node->next_report);
+        node->next_report = report;
+        if (!send_report(node, (enum report_index)report)) {
+            return;
         }
-        report = report + 1u < (uint32_t)REPORT_COUNT ? report + 1u : 0u;
+        sent += effort_of((enum report_index)report);
+        node->next_report = report + 1u < (uint32_t)REPORT_COUNT ? report + 1u : 0u;
     }
-    node->next_report = report;
 }
 
 void node_report(struct node *node) {

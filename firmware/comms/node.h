@@ -23,7 +23,7 @@
 #include "comms/tip_stream.h"
 
 #define NODE_FRAMES_A_STEP 24u  /* more than a 1 Mbit/s bus carries in a step */
-#define NODE_COMMANDS_A_STEP 3u /* of them, those that are for this node; what is left waits */
+#define NODE_COMMANDS_A_STEP 2u /* of them, those that are for this node; what is left waits */
 #define NODE_REPORTS_A_STEP 2u  /* frames sent */
 
 /* Why a command was refused. */

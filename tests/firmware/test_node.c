@@ -690,7 +690,7 @@ static void a_step_takes_a_bounded_number_of_frames(void **state) {
     bus.receives = 0;
     step();
     assert_int_equal(bus.receives, NODE_COMMANDS_A_STEP);
-    run(9);
+    run(30 / (int)NODE_COMMANDS_A_STEP - 1);
     assert_int_equal(node.counters.accepted, 30);
 }
 

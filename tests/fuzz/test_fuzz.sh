@@ -5,7 +5,7 @@ scratch=$(mktemp -d)
 trap 'rm -rf "$scratch"' EXIT
 . tests/support/check.sh
 shown="$scratch/*.txt"
-make -s BUILD="$build" fuzz-programs >"$scratch/make.txt" 2>&1
+make -s -j"$(nproc)" BUILD="$build" fuzz-programs >"$scratch/make.txt" 2>&1
 check fuzz_targets_build $?
 for target in frames tip_stream table parameters; do
     tests/fuzz/run "$build" 3 "$target" >"$scratch/$target.txt" 2>&1
