@@ -508,8 +508,9 @@ static uint32_t effort_of(enum report_index report) {
     return report == REPORT_TELEMETRY ? NODE_REPORTS_A_STEP : 1u;
 }
 
+/* A step that took commands has done its share of work. */
 static void send_reports(struct node *node) {
-    uint32_t sent = 0u;
+    uint32_t sent = node->took_commands ? 1u : 0u;
     while (sent < NODE_REPORTS_A_STEP && node->pending != 0u) {
         const uint32_t report = next_pending(node->pending, node->next_report);
         node->next_report = report;
@@ -886,6 +887,7 @@ static void take_frames(struct node *node) {
             return;
         }
         own += node_take(node, &frame) ? 1u : 0u;
+        node->took_commands = own > 0u;
     }
 }
 
@@ -906,6 +908,7 @@ static void step_store(struct node *node) {
 void node_step(struct node *node) {
     const struct hal_bus *bus = node->setup->bus;
     node->sequence_age += node->sequence_age < AGE_MOST ? 1u : 0u;
+    node->took_commands = false;
     if (bus != NULL) {
         bus->state(bus->context, &node->bus_state);
         node->app.bus_off = node->bus_state.bus_off;

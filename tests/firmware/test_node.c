@@ -718,6 +718,28 @@ static void every_telemetry_message_keeps_its_period(void **state) {
     assert_int_equal(node.counters.reports_dropped, 0);
 }
 
+/* Two commands in every step leave each message its turn, if not each of its turns. */
+static void a_flood_of_commands_starves_no_telemetry(void **state) {
+    (void)state;
+    start();
+    sim_bus_forget(&bus);
+    for (int i = 0; i < 2000; i++) {
+        put_pressure(1000.0f);
+        put_heartbeat();
+        const uint32_t before = bus.sent;
+        step();
+        assert_true(bus.sent - before <= 1u);
+    }
+    assert_int_equal(node.counters.refused, 0);
+    assert_in_range(count_sent(MESSAGE_PRESSURES), 340, 401);
+    for (uint32_t m = 0; m < (uint32_t)MESSAGE_COUNT; m++) {
+        const uint32_t period_ms = message_row((enum message_id)m)->period_ms;
+        if (period_ms > 0u && (enum message_id)m != MESSAGE_TELEMETRY) {
+            assert_true(count_sent((enum message_id)m) >= 1700u / period_ms);
+        }
+    }
+}
+
 static void a_new_state_is_said_at_once(void **state) {
     (void)state;
     struct message_status status;
@@ -1258,6 +1280,7 @@ int main(void) {
         cmocka_unit_test(a_bus_full_of_foreign_frames_delays_no_command),
         cmocka_unit_test(a_step_takes_a_bounded_number_of_frames),
         cmocka_unit_test(every_telemetry_message_keeps_its_period),
+        cmocka_unit_test(a_flood_of_commands_starves_no_telemetry),
         cmocka_unit_test(a_new_state_is_said_at_once),
         cmocka_unit_test(readings_that_are_missing_are_said_to_be),
         cmocka_unit_test(the_step_of_a_sample_leads_to_its_time),
