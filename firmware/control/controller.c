@@ -11,7 +11,7 @@
  *   capacity    two chambers a step, and one at the latest after CAPACITY_STEPS: in 3 ms of full flow it changes by some 2 %
  *   late valve  its duty is worked out once a period, in one of the last three steps before it: the forecast through the
  *               pulses on their way is long, and only the duty at the period's start counts
- *   table       a part of its CRC-32, a small one but in steps that only renew capacities */
+ *   table       a part of its CRC-32, a small one but in steps that have only capacities to renew */
 #include "control/controller.h"
 
 #include <stddef.h>
@@ -108,7 +108,6 @@ void controller_init(struct controller *controller, const struct bend_table *tab
         flow_watch_init(&controller->flow_watch[c]);
     }
     update_capacities(controller, 3u);
-    controller->tip_taken = 0u - TIP_STEPS;
     controller->tip_lost = true;
     controller->status.state = SUPERVISOR_BOOT;
 }
@@ -294,6 +293,13 @@ static void report_bend(struct controller *controller) {
     controller->status.bend_rad = real_hypot(bend[0], bend[1]);
     controller->status.direction_rad = real_atan2(bend[1], bend[0]);
     controller->status.bend_is_measured = !controller->tip_lost;
+}
+
+/* A late valve's duty has its turn in one of the last steps of a period. */
+static bool has_late_turn(const struct controller *controller, uint32_t c) {
+    const struct pressure_loop_parameters *parameters = &controller->loop_parameters[c];
+    const int32_t left_us = (int32_t)parameters->pwm_period_us - controller->clock.phase_us, step_us = CONTROLLER_STEP_US;
+    return parameters->late_us > 0 && left_us > (int32_t)c * step_us && left_us <= ((int32_t)c + 1) * step_us;
 }
 
 /* This step's one look into the table at length. `aims`: the targets want it. */
@@ -537,14 +543,6 @@ static void aim(struct controller *controller, bool may_look) {
     }
 }
 
-/* Always, but of a late valve, which has its turn among the last steps of a period. */
-static bool duty_is_due(const struct controller *controller, uint32_t c) {
-    const struct pressure_loop_parameters *parameters = &controller->loop_parameters[c];
-    const int32_t left_us = (int32_t)parameters->pwm_period_us - controller->clock.phase_us, step_us = CONTROLLER_STEP_US;
-    const bool turn = left_us > (int32_t)c * step_us && left_us <= ((int32_t)c + 1) * step_us;
-    return parameters->late_us == 0 || turn || !(controller->status.pressure_target_pa[c] > 0.0f);
-}
-
 static void drive(struct controller *controller, const struct controller_input *input,
                   struct controller_output *output) {
     output->valves_enabled = supervisor_valves_enabled(&controller->supervisor);
@@ -555,7 +553,8 @@ static void drive(struct controller *controller, const struct controller_input *
         output->duty[c] = 0.0f;
         if (!output->valves_enabled) {
             pressure_loop_vent(loop, parameters, &controller->clock);
-        } else if (duty_is_due(controller, c)) {
+        } else if (parameters->late_us == 0 || has_late_turn(controller, c) ||
+                   !(controller->status.pressure_target_pa[c] > 0.0f)) {
             output->duty[c] = pressure_loop_duty(loop, parameters, controller->status.pressure_target_pa[c],
                                                  supply_of(controller, input), controller->capacity_m3[c],
                                                  &controller->clock);
@@ -602,7 +601,8 @@ void controller_step(struct controller *controller, const struct controller_inpu
     const bool aims = controller->inverting || controller->targets_stale || input->command.kind != COMMAND_NONE;
     const enum look looks = look(controller, input->time_us, aims);
     watch_tip(controller, input->time_us);
-    supervise(controller, &corrected, input, looks != LOOK_IDLE);
+    const bool late = has_late_turn(controller, 0u) || has_late_turn(controller, 1u) || has_late_turn(controller, 2u);
+    supervise(controller, &corrected, input, late || looks != LOOK_IDLE);
     aim(controller, looks == LOOK_FOR_TARGETS);
     drive(controller, &corrected, output);
     report_bend(controller);

@@ -99,12 +99,9 @@ static void age_pulses(struct pressure_loop *loop, uint32_t now_us) {
 
 /* A valve that is late still has pulses before the last one ahead of it. */
 static void keep_pulse(struct pressure_loop *loop) {
-    const uint32_t last = loop->earlier_count < PRESSURE_LOOP_EARLIER ? loop->earlier_count : PRESSURE_LOOP_EARLIER - 1u;
-    for (uint32_t i = last; i > 0u; i--) {
-        loop->earlier[i] = loop->earlier[i - 1u];
-    }
-    loop->earlier[0] = loop->last;
-    loop->earlier_count = last + 1u;
+    loop->earlier_newest = (loop->earlier_newest + 1u) % PRESSURE_LOOP_EARLIER;
+    loop->earlier[loop->earlier_newest] = loop->last;
+    loop->earlier_count += loop->earlier_count < PRESSURE_LOOP_EARLIER ? 1u : 0u;
 }
 
 static bool open_at(const struct pressure_loop *loop, uint32_t time_us) {
@@ -137,8 +134,12 @@ static int32_t overlap(const struct pressure_loop_pulse *pulse, uint32_t from_us
 /* Of the `length_us` from `from_us` on, how long the valve fills. */
 static int32_t filling_us(const struct pressure_loop *loop, uint32_t from_us, int32_t length_us) {
     int32_t sum_us = overlap(&loop->last, from_us, length_us);
-    for (uint32_t i = 0; i < loop->earlier_count && since(from_us, loop->earlier[i].close_at_us) > 0; i++) {
-        sum_us += overlap(&loop->earlier[i], from_us, length_us); /* the older ones are over sooner still */
+    for (uint32_t i = 0; i < loop->earlier_count; i++) {
+        const struct pressure_loop_pulse *pulse = &loop->earlier[(loop->earlier_newest - i) % PRESSURE_LOOP_EARLIER];
+        if (since(from_us, pulse->close_at_us) <= 0) {
+            break; /* the older ones are over sooner still */
+        }
+        sum_us += overlap(pulse, from_us, length_us);
     }
     return sum_us;
 }
@@ -297,6 +298,6 @@ void pressure_loop_vent(struct pressure_loop *loop, const struct pressure_loop_p
     loop->duty = 0.0f;
     cut(&loop->last, shut_us);
     for (uint32_t i = 0; i < loop->earlier_count; i++) {
-        cut(&loop->earlier[i], shut_us);
+        cut(&loop->earlier[(loop->earlier_newest - i) % PRESSURE_LOOP_EARLIER], shut_us);
     }
 }

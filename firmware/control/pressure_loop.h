@@ -12,7 +12,7 @@
 #include <stdint.h>
 
 #define PRESSURE_LOOP_VENTED_MOST_US (1 << 30)
-#define PRESSURE_LOOP_EARLIER 7u /* pulses on their way to a valve that is late, beside the last one */
+#define PRESSURE_LOOP_EARLIER 8u /* pulses on their way to a valve that is late, beside the last one */
 
 struct pressure_loop_parameters {
     int64_t pwm_period_us;  /* the three at most some 100 ms: inside, 32 bits do */
@@ -63,7 +63,8 @@ struct pressure_loop {
     float duty;           /* of the period under way, as the valve takes it */
     float duty_next;      /* written, taken over at the next period */
     struct pressure_loop_pulse last; /* the valve fills within it; long after, held at PRESSURE_LOOP_VENTED_MOST_US ago */
-    struct pressure_loop_pulse earlier[PRESSURE_LOOP_EARLIER]; /* newest first; only of a valve that is late */
+    struct pressure_loop_pulse earlier[PRESSURE_LOOP_EARLIER]; /* only of a valve that is late */
+    uint32_t earlier_newest; /* in that ring */
     uint32_t earlier_count;
 };
 

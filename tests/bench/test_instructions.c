@@ -46,7 +46,7 @@ static void run_mission(enum frame_variant variant) {
     print_message("           control step: mean %.0f, worst %llu instructions\n", cost_mean(&compare.step),
                   (unsigned long long)cost_quantile(&compare.step, 1.0));
     assert_true(cost_quantile(&compare.step, 1.0) <= STEP_BOUND);
-    assert_true(cost_mean(&compare.step) > 1000.0); /* it did count */
+    assert_true(compare.active > STEPS / 2u);
     compare_close(&compare);
 }
 
@@ -98,6 +98,7 @@ static void walks_over_a_table_with_a_fold_hold_the_bounds(void **state) {
                   (unsigned long long)cost_quantile(&compare.inversion_step, 1.0));
     assert_true(cost_quantile(&compare.step, 1.0) <= STEP_BOUND);
     assert_true(cost_quantile(&compare.inversion_step, 1.0) <= INVERSION_BOUND);
+    assert_true(compare.active > STEPS / 2u);
     compare_close(&compare);
     synthetic_table_free(&synthetic);
 }

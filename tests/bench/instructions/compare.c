@@ -109,6 +109,7 @@ bool compare_steps(struct compare *compare, uint32_t steps) {
             return false;
         }
         mission_step(mission);
+        compare->active += mission->frame.output.state == (uint32_t)SUPERVISOR_ACTIVE ? 1u : 0u;
         if (memcmp(&output, &mission->frame.output, sizeof output) != 0) {
             (void)snprintf(compare->difference, sizeof compare->difference,
                            "step %u: target 1 %.9g Pa on the board, %.9g Pa on the host; state %u and %u",

@@ -16,6 +16,7 @@ struct compare {
     struct call_counter *counter;
     struct mission mission;
     uint32_t frame_address;
+    uint32_t active;            /* steps in which air could flow: a mission in FAULT costs little */
     struct cost step;           /* app_step(), with the stand-in for the hal */
     struct cost inversion_step; /* of an inversion; taking it up counts with the first */
     struct cost inversion;      /* all steps of one */

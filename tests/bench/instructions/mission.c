@@ -1,6 +1,7 @@
 #include "mission.h"
 
 #include <math.h>
+#include <stdlib.h>
 #include <string.h>
 
 #define TAU 6.283185307179586
@@ -139,10 +140,29 @@ void mission_read(struct mission *mission) {
 
 /* --- the mission --- */
 
+/* The last ones are what frame_app.c's calibration knows of. */
+static void add_effects(struct mission *mission, enum frame_variant variant) {
+    static const char *const effects[] = {"creep:amplitude=0.06,time_constant=0.5",
+                                          "chamber_leak:conductance=2e-12",
+                                          "pressure_gain:gain=1.03",
+                                          "pressure_offset:offset=120",
+                                          "pressure_lag:time_constant=0.01",
+                                          "valve_dead_time:delay=0.06",
+                                          "valve_dead_band:least_duty=0.12,loss=0.4",
+                                          "line_resistance:conductance_scale=0.9",
+                                          "line_volume:volume=1e-6"};
+    const size_t count = variant == FRAME_CALIBRATED ? sizeof effects / sizeof effects[0] : 2;
+    for (size_t i = 0; i < count; i++) {
+        struct effect effect;
+        char text[256];
+        if (!effect_parse(effects[i], &effect, text, sizeof text) || !sim_add_effect(&mission->sim, &effect)) {
+            abort(); /* the catalogue has changed */
+        }
+    }
+}
+
 bool mission_open(struct mission *mission, const void *image, size_t bytes, enum frame_variant variant, uint64_t seed) {
-    static const char *const effects[] = {"creep:amplitude=0.1,time_constant=0.5", "chamber_leak:conductance=2e-12"};
     struct sim_parameters parameters;
-    char text[256];
     memset(mission, 0, sizeof *mission);
     mission->frame.table_bytes = (uint32_t)bytes;
     mission->frame.variant = (uint32_t)variant;
@@ -153,12 +173,7 @@ bool mission_open(struct mission *mission, const void *image, size_t bytes, enum
     sim_default_parameters(&parameters);
     parameters.sensor.tip_period_us = 5000;
     sim_init(&mission->sim, mission->table, &parameters, seed);
-    for (size_t i = 0; i < sizeof effects / sizeof effects[0]; i++) {
-        struct effect effect;
-        if (effect_parse(effects[i], &effect, text, sizeof text)) {
-            (void)sim_add_effect(&mission->sim, &effect);
-        }
-    }
+    add_effects(mission, variant);
     sim_bind(&mission->sim, &mission->plant);
     random_seed(&mission->random, seed, 77);
     return true;
