@@ -473,8 +473,12 @@ enum can_link_wait can_link_receive(struct can_link *link, int64_t timeout_us, s
 }
 
 static bool is_same(const struct controller_command *a, const struct controller_command *b) {
-    return a->kind == b->kind && memcmp(a->pressure_pa, b->pressure_pa, sizeof a->pressure_pa) == 0 &&
-           a->bend_rad == b->bend_rad && a->direction_rad == b->direction_rad &&
+    for (uint32_t chamber = 0; chamber < 3u; chamber++) {
+        if (a->pressure_pa[chamber] != b->pressure_pa[chamber]) {
+            return false;
+        }
+    }
+    return a->kind == b->kind && a->bend_rad == b->bend_rad && a->direction_rad == b->direction_rad &&
            a->co_contraction_pa == b->co_contraction_pa;
 }
 

@@ -4,15 +4,15 @@ JOBS := $(shell nproc 2>/dev/null || echo 1)
 
 VERSION := $(shell sed -n 's/.*define TRIBEND_VERSION "\(.*\)"/\1/p' model/program/version.h)
 
-BUILD_PACKAGES := gcc libc6-dev pkg-config libgmsh-dev libsuitesparse-dev libgsl-dev libcyaml-dev libyaml-dev \
-                  libopenmpi-dev openmpi-bin zlib1g-dev libjansson-dev libcmocka-dev calculix-ccx gnuplot-nox fonts-dejavu-core \
-                  $(FIRMWARE_PACKAGES) $(EMULATOR_PACKAGES) $(HIL_PACKAGES) $(LCM_PACKAGES) $(VIEW_PACKAGES)
 FIRMWARE_PACKAGES := gcc-arm-none-eabi libnewlib-arm-none-eabi
 EMULATOR_PACKAGES := libunicorn-dev qemu-system-arm
 LCM_PACKAGES := liblcm-dev liblcm-bin
 HIL_PACKAGES := user-mode-linux can-utils kmod iproute2
 # npm brings the page's plotting library. Who has npm from elsewhere keeps it: Debian's would not go beside it.
 VIEW_PACKAGES := libmicrohttpd-dev $(if $(shell command -v npm),,npm)
+BUILD_PACKAGES := gcc libc6-dev pkg-config libgmsh-dev libsuitesparse-dev libgsl-dev libcyaml-dev libyaml-dev \
+                  libopenmpi-dev openmpi-bin zlib1g-dev libjansson-dev libcmocka-dev calculix-ccx gnuplot-nox fonts-dejavu-core \
+                  $(FIRMWARE_PACKAGES) $(EMULATOR_PACKAGES) $(HIL_PACKAGES) $(LCM_PACKAGES) $(VIEW_PACKAGES)
 # what `make test` alone needs
 TEST_PACKAGES  := chromium curl mandoc man-db bsdextrautils systemd librsvg2-bin clang python3-canmatrix
 LINT_PACKAGES  := clang clang-tidy cppcheck
@@ -284,8 +284,8 @@ lint-board:
 lint-misra:
 	@JOBS=$(JOBS) tests/tools/misra $(BUILD)
 lint-clang: $(LCM_C)
-	@set -e; for f in $(HOST_SIDE_C); do clang -O1 $(COMMON_FLAGS) $(MPI_FLAGS) -Wno-unknown-pragmas -Wno-source-uses-openmp \
-	    -fopenmp -fsyntax-only $$f; done
+	@printf '%s\n' $(HOST_SIDE_C) | xargs -P $(JOBS) -n 4 clang -O1 $(COMMON_FLAGS) $(MPI_FLAGS) -Wno-unknown-pragmas \
+	    -Wno-source-uses-openmp -fopenmp -fsyntax-only
 lint-cppcheck:
 	@cppcheck -j$(JOBS) $(CPPCHECK_FLAGS) $(FIRMWARE_C) $(BOARD_C) $(SIM_C) $(EMULATOR_C) $(MODEL_C) $(TABLES_CLI_C) $(HOST_C) $(HOST_MAIN) $(EMULATED_C) $(MANUAL_C)
 # one file at a time: with several, clang-tidy 14 takes every va_list for uninitialised
