@@ -1,7 +1,6 @@
 #include "board/can_socket.h"
 
 #include <errno.h>
-#include <linux/can.h>
 #include <linux/can/raw.h>
 #include <net/if.h>
 #include <stdio.h>
@@ -10,6 +9,8 @@
 #include <sys/socket.h>
 #include <sys/un.h>
 #include <unistd.h>
+
+#include "link/socketcan.h"
 
 #define UNIX_PREFIX "unix:"
 
@@ -75,22 +76,9 @@ void can_socket_close(struct can_socket *can) {
     }
 }
 
-static bool to_hal(const struct canfd_frame *frame, size_t size, struct hal_can_frame *hal) {
-    const bool fd = size == CANFD_MTU;
-    if ((!fd && size != CAN_MTU) || (frame->can_id & (CAN_ERR_FLAG | CAN_RTR_FLAG)) != 0 ||
-        frame->len > (fd ? CANFD_MAX_DLEN : CAN_MAX_DLEN)) {
-        return false;
-    }
-    *hal = (struct hal_can_frame){
-        .extended = (frame->can_id & CAN_EFF_FLAG) != 0, .fd = fd, .length = frame->len};
-    hal->id = frame->can_id & (hal->extended ? CAN_EFF_MASK : CAN_SFF_MASK);
-    memcpy(hal->data, frame->data, frame->len);
-    return true;
-}
-
 static bool take(struct can_socket *can, struct board *board) {
     struct canfd_frame frame;
-    struct hal_can_frame hal;
+    struct transport_frame taken;
     struct sockaddr_un sender = {.sun_family = AF_UNSPEC};
     socklen_t sender_bytes = sizeof sender;
     for (;;) {
@@ -103,26 +91,22 @@ static bool take(struct can_socket *can, struct board *board) {
             sender_bytes > sizeof sender.sun_family) {
             (void)snprintf(can->peer_path, sizeof can->peer_path, "%s", sender.sun_path);
         }
-        if (!to_hal(&frame, (size_t)size, &hal)) {
+        if (!socketcan_to_frame(&frame, (size_t)size, &taken) || taken.is_error) {
             can->ignored++;
-        } else if (board_send(board, &hal)) {
+        } else if (board_send(board, &taken.frame)) {
             can->taken++;
         }
         sender_bytes = sizeof sender;
     }
 }
 
-static bool give_one(struct can_socket *can, const struct hal_can_frame *hal) {
-    struct canfd_frame frame = {.can_id = hal->id | (hal->extended ? CAN_EFF_FLAG : 0u), .len = hal->length};
-    const size_t size = hal->fd ? CANFD_MTU : CAN_MTU;
+static bool give_one(struct can_socket *can, const struct hal_can_frame *frame) {
     struct sockaddr_un peer = {.sun_family = AF_UNIX};
-    memcpy(frame.data, hal->data, hal->length);
     if (can->own_path[0] == '\0') {
-        return send(can->descriptor, &frame, size, 0) == (ssize_t)size;
+        return socketcan_send(can->descriptor, frame, NULL) == TRANSPORT_DONE;
     }
     (void)snprintf(peer.sun_path, sizeof peer.sun_path, "%s", can->peer_path);
-    return can->peer_path[0] != '\0' && sendto(can->descriptor, &frame, size, 0,
-                                               (const struct sockaddr *)&peer, sizeof peer) == (ssize_t)size;
+    return can->peer_path[0] != '\0' && socketcan_send(can->descriptor, frame, &peer) == TRANSPORT_DONE;
 }
 
 bool can_socket_exchange(struct can_socket *can, struct board *board) {

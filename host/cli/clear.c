@@ -10,30 +10,10 @@
 #define AGAIN_US 300000
 #define WORDS_BYTES 512
 
-static error_t parse(int key, char *argument, struct argp_state *state) {
-    switch (key) {
-    case ARGP_KEY_INIT:
-        state->child_inputs[0] = state->input;
-        return 0;
-    case ARGP_KEY_ARG:
-        argp_error(state, "clear takes no argument, '%s' is too much", argument);
-        return 0;
-    default:
-        return ARGP_ERR_UNKNOWN;
-    }
-}
-
-static const struct argp_child children[] = {{&bus_options_parser, 0, NULL, 1}, {0}};
-static const struct argp parser = {
-    NULL,
-    parse,
-    "",
+static const char usage[] =
     "Leave FAULT, if the cause of each latched fault is gone. The module stays vented until the "
     "next command.\v"
-    "Example: tribend clear --bus can0",
-    children,
-    NULL,
-    NULL};
+    "Example: tribend clear --bus can0";
 
 static void send_clear(struct bus *bus, uint32_t faults) {
     const struct controller_command command = {.kind = COMMAND_CLEAR};
@@ -59,7 +39,8 @@ static int still_there(uint32_t faults) {
     return EXIT_REFUSED;
 }
 
-static int clear(struct bus *bus, const struct bus_options *options) {
+static int clear(struct bus *bus, void *input) {
+    const struct bus_options *options = input;
     struct link_report report;
     char words[WORDS_BYTES];
     if (!bus->link.receive(bus->link.context, &report)) {
@@ -89,17 +70,8 @@ static int clear(struct bus *bus, const struct bus_options *options) {
 }
 
 int cli_clear(int argc, char **argv) {
-    static struct bus bus;
     struct bus_options options;
     bus_options_init(&options);
-    argp_err_exit_status = EXIT_USAGE;
-    if (argp_parse(&parser, argc, argv, 0, NULL, &options) != 0) {
-        return EXIT_USAGE;
-    }
-    int code = bus_open(&bus, &options);
-    if (code == EXIT_OK) {
-        code = clear(&bus, &options);
-        bus_close(&bus);
-    }
-    return code;
+    const int code = bus_parse_alone("clear", usage, argc, argv, &options);
+    return code == EXIT_OK ? bus_run(&options, clear, &options) : code;
 }

@@ -40,8 +40,9 @@ int gap_close_run(int argc, char **argv);
 /* Options of every subcommand that talks to a controller. */
 struct bus_options {
     const char *bus;
-    uint32_t node;      /* of the board on it */
-    const char *table;  /* NULL: $TRIBEND_TABLE, else the reference table; on a real bus: whatever the board has */
+    uint32_t node; /* of the board on it */
+    const char
+        *table; /* NULL: $TRIBEND_TABLE, else the reference table; on a real bus: whatever the board has */
     const char *module; /* the module that the table must be of; NULL: any */
     const char *record;
     uint64_t seed;
@@ -93,6 +94,11 @@ int bus_open(struct bus *bus, const struct bus_options *options);
 /* The same of a bus that is not simulated. */
 int bus_open_can(struct bus *bus, const struct bus_options *options);
 void bus_close(struct bus *bus);
+/* Open the bus of `options`, `work` on it, close it; returns an exit code. */
+int bus_run(const struct bus_options *options, int (*work)(struct bus *bus, void *input), void *input);
+/* The arguments of a subcommand that has the options of a bus alone; returns an exit code. `usage`: argp's
+ * text after them. */
+int bus_parse_alone(const char *name, const char *usage, int argc, char **argv, struct bus_options *options);
 /* Faults that a drill puts into the simulation. */
 void bus_drill(struct bus *bus, const struct bus_options *options);
 /* The message that nothing comes any more; returns the exit code. */
@@ -100,8 +106,8 @@ int bus_gone(struct bus *bus, const struct bus_options *options);
 
 /* Follow `command` for the options' duration, vent, say how it went; returns an exit code. */
 int run_command(const struct bus_options *options, const struct controller_command *command);
-/* "overpressure, command timeout": the faults' or warnings' words into `text`. A gap between module and model is said with the
- * stage and the chamber that the gap monitor found. */
+/* "overpressure, command timeout": the faults' or warnings' words into `text`. A gap between module and model
+ * is said with the stage and the chamber that the gap monitor found. */
 void cli_describe_faults(uint32_t faults, char *text, size_t bytes);
 void cli_describe_warnings(const struct controller_status *status, char *text, size_t bytes);
 

@@ -7,30 +7,10 @@
 
 #define WITHIN_US 1000000
 
-static error_t parse(int key, char *argument, struct argp_state *state) {
-    switch (key) {
-    case ARGP_KEY_INIT:
-        state->child_inputs[0] = state->input;
-        return 0;
-    case ARGP_KEY_ARG:
-        argp_error(state, "hold takes no argument, '%s' is too much", argument);
-        return 0;
-    default:
-        return ARGP_ERR_UNKNOWN;
-    }
-}
-
-static const struct argp_child children[] = {{&bus_options_parser, 0, NULL, 1}, {0}};
-static const struct argp parser = {
-    NULL,
-    parse,
-    "",
+static const char usage[] =
     "Keep the pressures that the module has now, which another host commanded, until --for is "
     "over or Ctrl-C; then vent. The other host's commands are refused from then on.\v"
-    "Example: tribend hold --bus can0 --for 60s",
-    children,
-    NULL,
-    NULL};
+    "Example: tribend hold --bus can0 --for 60s";
 
 static bool moves(enum supervisor_state state) {
     return state == SUPERVISOR_ACTIVE || state == SUPERVISOR_HOLD;
@@ -63,7 +43,8 @@ static int hold(struct bus *bus, const struct bus_options *options, struct link_
     return program_interrupted == 0 ? EXIT_OK : EXIT_INTERRUPTED;
 }
 
-static int run(struct bus *bus, const struct bus_options *options) {
+static int run(struct bus *bus, void *input) {
+    const struct bus_options *options = input;
     const struct controller_command vent = {.kind = COMMAND_VENT};
     struct link_report report;
     if (!bus->link.receive(bus->link.context, &report)) {
@@ -85,18 +66,9 @@ static int run(struct bus *bus, const struct bus_options *options) {
 }
 
 int cli_hold(int argc, char **argv) {
-    static struct bus bus;
     struct bus_options options;
     bus_options_init(&options);
     options.duration_s = 86400.0;
-    argp_err_exit_status = EXIT_USAGE;
-    if (argp_parse(&parser, argc, argv, 0, NULL, &options) != 0) {
-        return EXIT_USAGE;
-    }
-    int code = bus_open(&bus, &options);
-    if (code == EXIT_OK) {
-        code = run(&bus, &options);
-        bus_close(&bus);
-    }
-    return code;
+    const int code = bus_parse_alone("hold", usage, argc, argv, &options);
+    return code == EXIT_OK ? bus_run(&options, run, &options) : code;
 }

@@ -258,8 +258,11 @@ static int watch(struct monitor *monitor, bool keys) {
     return EXIT_OK;
 }
 
-static int show(struct monitor *monitor) {
+static int show(struct bus *bus, void *input) {
+    struct monitor *monitor = input;
     struct termios before;
+    monitor->bus = bus;
+    program_catch_interrupt();
     if (monitor->arguments->json) {
         return watch(monitor, false);
     }
@@ -275,20 +278,13 @@ static int show(struct monitor *monitor) {
 }
 
 int cli_monitor(int argc, char **argv) {
-    static struct bus bus;
     struct arguments arguments = {.json = false};
-    struct monitor monitor = {.bus = &bus, .arguments = &arguments, .full_pa = BAR_PA};
+    struct monitor monitor = {.arguments = &arguments, .full_pa = BAR_PA};
     bus_options_init(&arguments.bus);
     arguments.bus.duration_s = 0.0; /* until q or Ctrl-C */
     argp_err_exit_status = EXIT_USAGE;
     if (argp_parse(&parser, argc, argv, 0, NULL, &arguments) != 0) {
         return EXIT_USAGE;
     }
-    int code = bus_open(&bus, &arguments.bus);
-    if (code == EXIT_OK) {
-        program_catch_interrupt();
-        code = show(&monitor);
-        bus_close(&bus);
-    }
-    return code;
+    return bus_run(&arguments.bus, show, &monitor);
 }

@@ -14,17 +14,20 @@
 static const struct argp_option option_list[] = {
     {"for", 'f', "TIME", 0, "how long, such as 5s (default 5s)", 1},
     {"bus", 'b', "BUS", 0,
-     "where the controller is: sim, controller and plant in this process (default); can0 or another CAN interface; "
+     "where the controller is: sim, controller and plant in this process (default); can0 or another CAN "
+     "interface; "
      "slcan:/dev/ttyACM0[@BITRATE]; unix:PATH, an emulated board",
      1},
     {"node", 'n', "N", 0, "node id of the board on the bus, 1 to 15 (default 1)", 1},
-    {"on-interrupt", 'I', "vent|hold", 0, "what Ctrl-C does: vent (default), or hold until it is pressed again", 1},
+    {"on-interrupt", 'I', "vent|hold", 0,
+     "what Ctrl-C does: vent (default), or hold until it is pressed again", 1},
     {"table", 't', "FILE", 0, "bend table (default $TRIBEND_TABLE, else " REFERENCE_TABLE ")", 1},
     {"module", 'm', "NAME", 0, "refuse a table of any other module", 1},
     {"record", 'r', "FILE", 0, "write a run log (CSV)", 1},
     {"seed", 's', "N", 0, "of the simulation's noise (default 1)", 2},
     {"effect", 'e', "NAME[:P=V,..]", 0, "add a real-world effect to the plant; may be repeated", 2},
-    {"calibration", 'k', "FILE", 0, "the simulated module is as this calibration says (see docs/calibration.md)", 2},
+    {"calibration", 'k', "FILE", 0,
+     "the simulated module is as this calibration says (see docs/calibration.md)", 2},
     {"controller-calibration", 'K', "FILE", 0, "the controller is told of this calibration", 2},
     {"drill", 'd', "FAULT@TIME", 0, "put a fault into the simulation, such as tip-lost@2s", 2},
     {"quiet", 'q', NULL, 0, "no progress lines", 1},
@@ -131,7 +134,8 @@ static error_t parse(int key, char *argument, struct argp_state *state) {
         return 0;
     case ARGP_KEY_END:
         if (options->sim_only != NULL && strcmp(options->bus, "sim") != 0) {
-            argp_error(state, "%s is for the simulation: it does nothing on bus %s", options->sim_only, options->bus);
+            argp_error(state, "%s is for the simulation: it does nothing on bus %s", options->sim_only,
+                       options->bus);
         }
         return 0;
     default:
@@ -159,13 +163,14 @@ const char *bus_table_path(const char *table, char found[PROGRAM_PATH_BYTES]) {
 }
 
 /* The module as --calibration says. Returns an exit code. */
-static int calibrate_module(const struct bus *bus, const struct bus_options *options, struct calibration *calibration,
-                            struct sim_link_setup *setup) {
+static int calibrate_module(const struct bus *bus, const struct bus_options *options,
+                            struct calibration *calibration, struct sim_link_setup *setup) {
     char error[PROGRAM_ERROR_BYTES];
     if (options->calibration == NULL) {
         return EXIT_OK;
     }
-    if (!calibration_read(options->calibration, bus->file.table.module.name, calibration, error, sizeof error)) {
+    if (!calibration_read(options->calibration, bus->file.table.module.name, calibration, error,
+                          sizeof error)) {
         return program_fail(EXIT_BAD_INPUT, "%s", error);
     }
     calibration_scale_plant(calibration, &setup->sim.plant);
@@ -173,7 +178,8 @@ static int calibrate_module(const struct bus *bus, const struct bus_options *opt
 }
 
 /* The controller as --controller-calibration says. Returns an exit code. */
-static int calibrate_controller(struct bus *bus, const struct bus_options *options, struct sim_link_setup *setup) {
+static int calibrate_controller(struct bus *bus, const struct bus_options *options,
+                                struct sim_link_setup *setup) {
     const char *path = options->controller_calibration;
     char error[PROGRAM_ERROR_BYTES];
     struct calibration calibration;
@@ -196,15 +202,17 @@ static int calibrate_controller(struct bus *bus, const struct bus_options *optio
     return EXIT_OK;
 }
 
-static int add_effects(struct bus *bus, const struct bus_options *options, const struct calibration *calibration) {
+static int add_effects(struct bus *bus, const struct bus_options *options,
+                       const struct calibration *calibration) {
     struct sim *sim = &bus->sim.sim;
     if (!calibration_add_effects(calibration, 0.0, sim)) {
-        return program_fail(EXIT_USAGE, "the simulation has no room for the %zu effects of %s", calibration->effects,
-                            options->calibration);
+        return program_fail(EXIT_USAGE, "the simulation has no room for the %zu effects of %s",
+                            calibration->effects, options->calibration);
     }
     for (size_t i = 0; i < options->effect_count; i++) {
         if (!sim_add_effect(sim, &options->effect[i])) {
-            return program_fail(EXIT_USAGE, "the simulation has no room for effect '%s'", options->effect[i].kind->name);
+            return program_fail(EXIT_USAGE, "the simulation has no room for effect '%s'",
+                                options->effect[i].kind->name);
         }
     }
     return EXIT_OK;
@@ -247,6 +255,43 @@ void bus_close(struct bus *bus) {
     }
 }
 
+int bus_run(const struct bus_options *options, int (*work)(struct bus *bus, void *input), void *input) {
+    static struct bus bus; /* with a simulation in it: too large for the stack */
+    int code = bus_open(&bus, options);
+    if (code == EXIT_OK) {
+        code = work(&bus, input);
+        bus_close(&bus);
+    }
+    return code;
+}
+
+struct alone {
+    const char *name;
+    struct bus_options *options;
+};
+
+static error_t parse_alone(int key, char *argument, struct argp_state *state) {
+    const struct alone *alone = state->input;
+    switch (key) {
+    case ARGP_KEY_INIT:
+        state->child_inputs[0] = alone->options;
+        return 0;
+    case ARGP_KEY_ARG:
+        argp_error(state, "%s takes no argument, '%s' is too much", alone->name, argument);
+        return 0;
+    default:
+        return ARGP_ERR_UNKNOWN;
+    }
+}
+
+int bus_parse_alone(const char *name, const char *usage, int argc, char **argv, struct bus_options *options) {
+    const struct argp_child children[] = {{&bus_options_parser, 0, NULL, 1}, {0}};
+    const struct argp parser = {NULL, parse_alone, "", usage, children, NULL, NULL};
+    struct alone alone = {name, options};
+    argp_err_exit_status = EXIT_USAGE;
+    return argp_parse(&parser, argc, argv, 0, NULL, &alone) == 0 ? EXIT_OK : EXIT_USAGE;
+}
+
 void bus_drill(struct bus *bus, const struct bus_options *options) {
     if (bus->can == NULL) {
         sim_drill_apply(&options->drill, &bus->sim, bus->controller_image, bus->file.size);
@@ -255,10 +300,11 @@ void bus_drill(struct bus *bus, const struct bus_options *options) {
 
 int bus_gone(struct bus *bus, const struct bus_options *options) {
     const double silence_s = bus->can == NULL ? 0.0 : 1e-6 * (double)can_link_silence_us(bus->can);
-    return program_fail(EXIT_BUS,
-                        "the board on bus %s went away: nothing came for %.1f s. While it hears nothing, it vents by "
-                        "itself on its command timeout",
-                        options->bus, silence_s);
+    return program_fail(
+        EXIT_BUS,
+        "the board on bus %s went away: nothing came for %.1f s. While it hears nothing, it vents by "
+        "itself on its command timeout",
+        options->bus, silence_s);
 }
 
 static void append(char *text, size_t bytes, const char *word) {
@@ -283,7 +329,8 @@ static void append_gap(char *text, size_t bytes, const struct gap_monitor_report
     if (gap->chamber > 0) {
         (void)snprintf(chamber, sizeof chamber, "chamber %u, ", gap->chamber);
     }
-    (void)snprintf(words, sizeof words, "gap between module and model in %s%s", chamber, gap_monitor_stage_text(gap->stage));
+    (void)snprintf(words, sizeof words, "gap between module and model in %s%s", chamber,
+                   gap_monitor_stage_text(gap->stage));
     append(text, bytes, words);
 }
 

@@ -273,18 +273,17 @@ static const struct argp parser = {
     NULL,
     NULL};
 
+static int run_action(struct bus *bus, void *input) {
+    const struct arguments *arguments = input;
+    return find_action(arguments->word[0])->run(bus, arguments);
+}
+
 int cli_params(int argc, char **argv) {
-    static struct bus bus;
     struct arguments arguments = {.words = 0};
     bus_options_init(&arguments.bus);
     argp_err_exit_status = EXIT_USAGE;
     if (argp_parse(&parser, argc, argv, 0, NULL, &arguments) != 0) {
         return EXIT_USAGE;
     }
-    int code = bus_open(&bus, &arguments.bus);
-    if (code == EXIT_OK) {
-        code = find_action(arguments.word[0])->run(&bus, &arguments);
-        bus_close(&bus);
-    }
-    return code;
+    return bus_run(&arguments.bus, run_action, &arguments);
 }

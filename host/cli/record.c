@@ -55,8 +55,8 @@ static bool is_over(const struct bus *bus, const struct bus_options *bus_options
 }
 
 /* A board that is gone may come back, and its rows go on. False: the simulation ended. */
-static bool take_row(struct bus *bus, const struct bus_options *bus_options, struct run_log_writer *log, uint64_t *rows,
-                     struct link_report *report) {
+static bool take_row(struct bus *bus, const struct bus_options *bus_options, struct run_log_writer *log,
+                     uint64_t *rows, struct link_report *report) {
     const struct controller_command nothing = {.kind = COMMAND_NONE};
     bus_drill(bus, bus_options);
     if (bus->can == NULL && !bus->link.receive(bus->link.context, report)) {
@@ -84,8 +84,8 @@ static int follow(struct bus *bus, const struct bus_options *bus_options, struct
     return program_interrupted == 0 ? EXIT_OK : EXIT_INTERRUPTED;
 }
 
-static void print_summary(struct bus *bus, const struct bus_options *bus_options, const struct link_report *report,
-                          uint64_t rows) {
+static void print_summary(struct bus *bus, const struct bus_options *bus_options,
+                          const struct link_report *report, uint64_t rows) {
     char words[WORDS_BYTES];
     printf("rows      %" PRIu64 ", until %.3f s\n", rows, 1e-6 * (double)report->time_us);
     printf("state     %s\n", supervisor_state_name(report->status.state));
@@ -96,12 +96,14 @@ static void print_summary(struct bus *bus, const struct bus_options *bus_options
         can_link_count(bus->can, &counters);
         printf("lost      %" PRIu64 " reports on the way, %" PRIu64 " here; the board fell silent %" PRIu64
                " times, started anew %" PRIu64 " times\n",
-               counters.missing, counters.dropped + counters.overflowed, counters.silences, counters.restarts);
+               counters.missing, counters.dropped + counters.overflowed, counters.silences,
+               counters.restarts);
     }
     printf("wrote     %s\n", bus_options->record);
 }
 
-static int record(struct bus *bus, const struct bus_options *bus_options) {
+static int record(struct bus *bus, void *input) {
+    const struct bus_options *bus_options = input;
     char error[PROGRAM_ERROR_BYTES], note[64];
     struct run_log_writer log;
     struct link_report report;
@@ -123,17 +125,11 @@ static int record(struct bus *bus, const struct bus_options *bus_options) {
 }
 
 int cli_record(int argc, char **argv) {
-    static struct bus bus;
     struct bus_options bus_options;
     bus_options_init(&bus_options);
     argp_err_exit_status = EXIT_USAGE;
     if (argp_parse(&parser, argc, argv, 0, NULL, &bus_options) != 0) {
         return EXIT_USAGE;
     }
-    int code = bus_open(&bus, &bus_options);
-    if (code == EXIT_OK) {
-        code = record(&bus, &bus_options);
-        bus_close(&bus);
-    }
-    return code;
+    return bus_run(&bus_options, record, &bus_options);
 }

@@ -8,7 +8,7 @@
 #include "cli/report_json.h"
 
 #define DEGREES (180.0 / M_PI)
-#define LISTEN_S 0.1 /* unless --for says otherwise */
+#define LISTEN_S 0.1     /* unless --for says otherwise */
 #define LISTEN_BUS_S 0.6 /* the slowest telemetry comes every 0.5 s */
 #define WORDS_BYTES 512
 
@@ -37,13 +37,18 @@ static error_t parse(int key, char *argument, struct argp_state *state) {
 }
 
 static const struct argp_child children[] = {{&bus_options_parser, 0, NULL, 1}, {0}};
-static const struct argp parser = {options, parse, "",
-                                   "Say what the controller sees, which faults it has, and where the module does not do what its model "
-                                   "says. It listens for 0.1 s (0.6 s on a bus), unless --for says otherwise.\v"
-                                   "Examples:\n"
-                                   "  tribend status --bus can0 --node 2\n"
-                                   "  tribend status --json",
-                                   children, NULL, NULL};
+static const struct argp parser = {
+    options,
+    parse,
+    "",
+    "Say what the controller sees, which faults it has, and where the module does not do what its model "
+    "says. It listens for 0.1 s (0.6 s on a bus), unless --for says otherwise.\v"
+    "Examples:\n"
+    "  tribend status --bus can0 --node 2\n"
+    "  tribend status --json",
+    children,
+    NULL,
+    NULL};
 
 static void print_table(const struct bus *bus) {
     const struct bend_table_module *module = &bus->file.table.module;
@@ -51,8 +56,8 @@ static void print_table(const struct bus *bus) {
         printf("table      %s, module %s, up to %.0f deg and %.1f kPa\n", bus->table_path, module->name,
                DEGREES * (double)module->bend_limit_rad, 1e-3 * (double)module->working_pressure_pa);
     } else {
-        printf("board      node %u, protocol %u, firmware %08" PRIx32 "\n", bus->can->node, bus->identity.protocol,
-               bus->identity.firmware);
+        printf("board      node %u, protocol %u, firmware %08" PRIx32 "\n", bus->can->node,
+               bus->identity.protocol, bus->identity.firmware);
         printf("table      on the board, module %s, %016" PRIx64 "\n",
                *bus->module_name != '\0' ? bus->module_name : "none", bus->table_hash);
     }
@@ -63,17 +68,18 @@ static void print_counters(struct bus *bus) {
     struct can_link_counters counters;
     can_link_count(bus->can, &counters);
     printf("bus        %" PRIu64 " frames received, %" PRIu64 " sent", counters.received, counters.sent);
-#define PRINT_COUNTER(name, text)                                                                                      \
-    if (counters.name > 0 && strcmp(#name, "received") != 0 && strcmp(#name, "sent") != 0 &&                           \
-        strcmp(#name, "decoded") != 0) {                                                                               \
-        printf("\n           %" PRIu64 " %s", counters.name, text);                                                    \
+#define PRINT_COUNTER(name, text)                                                                            \
+    if (counters.name > 0 && strcmp(#name, "received") != 0 && strcmp(#name, "sent") != 0 &&                 \
+        strcmp(#name, "decoded") != 0) {                                                                     \
+        printf("\n           %" PRIu64 " %s", counters.name, text);                                          \
     }
     CAN_LINK_COUNTERS(PRINT_COUNTER)
 #undef PRINT_COUNTER
     printf("\n");
 }
 
-static void print_status(struct bus *bus, const struct bus_options *bus_options, const struct link_report *report) {
+static void print_status(struct bus *bus, const struct bus_options *bus_options,
+                         const struct link_report *report) {
     const struct controller_status *status = &report->status;
     char words[WORDS_BYTES];
     printf("bus        %s\n", bus_options->bus);
@@ -90,8 +96,8 @@ static void print_status(struct bus *bus, const struct bus_options *bus_options,
            DEGREES * (double)status->direction_rad,
            status->bend_is_measured ? "measured" : "predicted from the pressures");
     printf("tip        %.2f %.2f %.2f mm, %u samples, %u rejected\n", 1e3 * (double)report->tip_position_m[0],
-           1e3 * (double)report->tip_position_m[1], 1e3 * (double)report->tip_position_m[2], status->tip_samples,
-           status->tip_rejected);
+           1e3 * (double)report->tip_position_m[1], 1e3 * (double)report->tip_position_m[2],
+           status->tip_samples, status->tip_rejected);
     if (bus->can != NULL) {
         print_counters(bus);
     }
@@ -121,7 +127,11 @@ static int listen_for(struct bus *bus, const struct bus_options *bus_options, st
     return EXIT_OK;
 }
 
-static int show(struct bus *bus, const struct arguments *arguments) {
+static int show(struct bus *bus, void *input) {
+    struct arguments *arguments = input;
+    if (arguments->bus.duration_s <= 0.0) {
+        arguments->bus.duration_s = bus->can != NULL ? LISTEN_BUS_S : LISTEN_S;
+    }
     struct link_report report;
     memset(&report, 0, sizeof report);
     int code = listen_for(bus, &arguments->bus, &report);
@@ -134,7 +144,6 @@ static int show(struct bus *bus, const struct arguments *arguments) {
 }
 
 int cli_status(int argc, char **argv) {
-    static struct bus bus;
     struct arguments arguments = {.json = false};
     bus_options_init(&arguments.bus);
     arguments.bus.duration_s = 0.0;
@@ -142,13 +151,5 @@ int cli_status(int argc, char **argv) {
     if (argp_parse(&parser, argc, argv, 0, NULL, &arguments) != 0) {
         return EXIT_USAGE;
     }
-    int code = bus_open(&bus, &arguments.bus);
-    if (code == EXIT_OK) {
-        if (arguments.bus.duration_s <= 0.0) {
-            arguments.bus.duration_s = bus.can != NULL ? LISTEN_BUS_S : LISTEN_S;
-        }
-        code = show(&bus, &arguments);
-        bus_close(&bus);
-    }
-    return code;
+    return bus_run(&arguments.bus, show, &arguments);
 }

@@ -8,28 +8,8 @@
 #define VENT_WITHIN_US 10000000
 #define VENTED_PA 500.0f
 
-static error_t parse(int key, char *argument, struct argp_state *state) {
-    switch (key) {
-    case ARGP_KEY_INIT:
-        state->child_inputs[0] = state->input;
-        return 0;
-    case ARGP_KEY_ARG:
-        argp_error(state, "vent takes no argument, '%s' is too much", argument);
-        return 0;
-    default:
-        return ARGP_ERR_UNKNOWN;
-    }
-}
-
-static const struct argp_child children[] = {{&bus_options_parser, 0, NULL, 1}, {0}};
-static const struct argp parser = {NULL,
-                                   parse,
-                                   "",
-                                   "Vent all chambers, whatever else goes on, and watch the pressures go.\v"
-                                   "Example: tribend vent --bus can0",
-                                   children,
-                                   NULL,
-                                   NULL};
+static const char usage[] = "Vent all chambers, whatever else goes on, and watch the pressures go.\v"
+                            "Example: tribend vent --bus can0";
 
 static bool is_vented(const struct link_report *report) {
     const float *pressure_pa = report->status.pressure_estimate_pa;
@@ -37,7 +17,8 @@ static bool is_vented(const struct link_report *report) {
            report->status.state != SUPERVISOR_ACTIVE && report->status.state != SUPERVISOR_HOLD;
 }
 
-static int vent(struct bus *bus, const struct bus_options *options) {
+static int vent(struct bus *bus, void *input) {
+    const struct bus_options *options = input;
     const struct controller_command command = {.kind = COMMAND_VENT};
     struct link_report report;
     int64_t start_us = -1;
@@ -59,18 +40,9 @@ static int vent(struct bus *bus, const struct bus_options *options) {
 }
 
 int cli_vent(int argc, char **argv) {
-    static struct bus bus;
     struct bus_options options;
     bus_options_init(&options);
     options.vent_at_once = true;
-    argp_err_exit_status = EXIT_USAGE;
-    if (argp_parse(&parser, argc, argv, 0, NULL, &options) != 0) {
-        return EXIT_USAGE;
-    }
-    int code = bus_open(&bus, &options);
-    if (code == EXIT_OK) {
-        code = vent(&bus, &options);
-        bus_close(&bus);
-    }
-    return code;
+    const int code = bus_parse_alone("vent", usage, argc, argv, &options);
+    return code == EXIT_OK ? bus_run(&options, vent, &options) : code;
 }

@@ -86,11 +86,13 @@ static enum transport_result receive(struct transport *transport, struct transpo
     }
 }
 
-static enum transport_result send_frame(struct transport *transport, const struct hal_can_frame *frame) {
+enum transport_result socketcan_send(int descriptor, const struct hal_can_frame *frame,
+                                     const struct sockaddr_un *peer) {
     struct canfd_frame can;
     const size_t size = socketcan_from_frame(frame, &can);
     for (;;) {
-        const ssize_t sent = send(transport->descriptor, &can, size, MSG_NOSIGNAL);
+        const ssize_t sent = sendto(descriptor, &can, size, MSG_NOSIGNAL, (const struct sockaddr *)peer,
+                                    peer != NULL ? sizeof *peer : 0);
         if (sent == (ssize_t)size) {
             return TRANSPORT_DONE;
         }
@@ -98,6 +100,10 @@ static enum transport_result send_frame(struct transport *transport, const struc
             return errno == EAGAIN || errno == ENOBUFS ? TRANSPORT_NOTHING : TRANSPORT_GONE;
         }
     }
+}
+
+static enum transport_result send_frame(struct transport *transport, const struct hal_can_frame *frame) {
+    return socketcan_send(transport->descriptor, frame, NULL);
 }
 
 static void close_socket(struct transport *transport) {

@@ -29,19 +29,8 @@ static enum transport_result receive(struct transport *transport, struct transpo
 
 static enum transport_result send_frame(struct transport *transport, const struct hal_can_frame *frame) {
     struct sockaddr_un peer = {.sun_family = AF_UNIX};
-    struct canfd_frame can;
-    const size_t size = socketcan_from_frame(frame, &can);
     (void)snprintf(peer.sun_path, sizeof peer.sun_path, "%s", transport->peer_path);
-    for (;;) {
-        const ssize_t sent = sendto(transport->descriptor, &can, size, MSG_NOSIGNAL,
-                                    (const struct sockaddr *)&peer, sizeof peer);
-        if (sent == (ssize_t)size) {
-            return TRANSPORT_DONE;
-        }
-        if (sent < 0 && errno != EINTR) {
-            return errno == EAGAIN || errno == ENOBUFS ? TRANSPORT_NOTHING : TRANSPORT_GONE;
-        }
-    }
+    return socketcan_send(transport->descriptor, frame, &peer);
 }
 
 static void close_socket(struct transport *transport) {

@@ -10,6 +10,7 @@
 #include "link/sim_link.h"
 #include "log/run_log.h"
 #include "program/table_file.h"
+#include "support/scratch.h"
 #include "support/test.h"
 
 #define RECORDING_TABLE "tables/paper-semicircle.tbt"
@@ -108,13 +109,12 @@ static inline void recording_write_run(const struct recording *recording, size_t
 
 /* Records it and reads it back. Free with gap_data_free(). */
 static inline void recording_take(const struct recording *recording, struct gap_data *data) {
-    static char path[RECORDING_RUNS_MAX][64];
+    static char path[RECORDING_RUNS_MAX][SCRATCH_BYTES];
     const char *paths[RECORDING_RUNS_MAX];
     char error[512];
     const size_t runs = recording->runs > 0 ? recording->runs : 1;
     for (size_t i = 0; i < runs; i++) {
-        (void)snprintf(path[i], sizeof path[i], "/tmp/tribend-test-XXXXXX");
-        const int file = mkstemp(path[i]);
+        const int file = scratch_file(path[i]);
         assert_true(file >= 0 && close(file) == 0);
         paths[i] = path[i];
         recording_write_run(recording, i, path[i]);

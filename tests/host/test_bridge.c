@@ -9,6 +9,7 @@
 #include "lcm/bridge_messages.h"
 #include "log/lcm_type.h"
 #include "support/test.h"
+#include "support/scratch.h"
 #include "tribend_bridge_t.h"
 #include "tribend_command_t.h"
 #include "tribend_gap_t.h"
@@ -453,9 +454,9 @@ static void delays_are_told_within_nine_percent(void **state) {
 
 static void a_log_that_is_there_is_not_touched(void **state) {
     struct bridge_logs logs;
-    char path[] = "/tmp/tribend-log-XXXXXX", error[256];
+    char path[SCRATCH_BYTES], error[256];
     (void)state;
-    const int descriptor = mkstemp(path);
+    const int descriptor = scratch_file(path);
     assert_true(descriptor >= 0);
     (void)close(descriptor);
     const struct bridge_logs_paths paths = {.can = path};

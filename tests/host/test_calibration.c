@@ -10,19 +10,20 @@
 #include "link/sim_link.h"
 #include "program/input_file.h"
 #include "program/table_file.h"
+#include "support/scratch.h"
 #include "support/synthetic_table.h"
 
 #define TABLE "tables/paper-semicircle.tbt"
 #define MODULE "paper-semicircle"
 #define DEGREE (M_PI / 180.0)
 
-static char directory[] = "/tmp/tribend-test-XXXXXX";
-static char path[64];
+static char directory[SCRATCH_BYTES];
+static char path[SCRATCH_WITHIN_BYTES];
 static struct table_file file;
 
 static int set_up(void **state) {
     (void)state;
-    if (mkdtemp(directory) == NULL) {
+    if (!scratch_folder(directory)) {
         return -1;
     }
     (void)snprintf(path, sizeof path, "%s/found.yaml", directory);

@@ -8,6 +8,7 @@
 #include "link/sim_link.h"
 #include "log/run_log.h"
 #include "program/table_file.h"
+#include "support/scratch.h"
 
 #define TABLE "tables/paper-semicircle.tbt"
 #define SECONDS 40
@@ -15,7 +16,7 @@
 #define COMMAND_US 100000
 
 static struct table_file table;
-static char log_path[] = "/tmp/tribend-test-XXXXXX";
+static char log_path[SCRATCH_BYTES];
 
 /* Each chamber to a random pressure every second or two, in every fourth stretch to none. */
 static void draw_command(struct random_stream *random, struct controller_command *command, int64_t *until_us) {
@@ -158,7 +159,7 @@ static void text_is_one_line(void **state) {
 
 static int set_up(void **state) {
     (void)state;
-    const int file = mkstemp(log_path);
+    const int file = scratch_file(log_path);
     return file < 0 || close(file) != 0 ? -1 : table_file_open(&table, TABLE, NULL);
 }
 

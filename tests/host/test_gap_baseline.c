@@ -11,6 +11,7 @@
 #include "log/mapping_import.h"
 #include "log/run_log.h"
 #include "program/table_file.h"
+#include "support/scratch.h"
 
 #define TABLE "tables/paper-semicircle.tbt"
 #define ROW_S 0.01
@@ -27,13 +28,14 @@ static const char *const names[] = {"time_s",      "valve1",      "valve2",     
 enum { TIME, DUTY, READING = 4, PLACE = 7, TURN = 10, SIM_PLACE = 14, SIM_TURN = 17, SIM_PRESSURE = 21, COLUMNS = 24 };
 
 static struct table_file table;
-static char directory[] = "/tmp/tribend-test-XXXXXX";
-static char log_path[80], json_path[80], source_path[80], mapping_path[80];
+static char directory[SCRATCH_BYTES];
+static char log_path[SCRATCH_WITHIN_BYTES], json_path[SCRATCH_WITHIN_BYTES], source_path[SCRATCH_WITHIN_BYTES],
+    mapping_path[SCRATCH_WITHIN_BYTES];
 static double value[ROWS][COLUMNS];
 
 static int set_up(void **state) {
     (void)state;
-    if (table_file_open(&table, TABLE, NULL) != 0 || mkdtemp(directory) == NULL) {
+    if (table_file_open(&table, TABLE, NULL) != 0 || !scratch_folder(directory)) {
         return -1;
     }
     (void)snprintf(log_path, sizeof log_path, "%s/run.csv", directory);

@@ -10,6 +10,7 @@
 #include "gap/report_markup.h"
 #include "log/run_log.h"
 #include "program/table_file.h"
+#include "support/scratch.h"
 
 #define TABLE "tables/paper-semicircle.tbt"
 #define STEP_US 1000
@@ -29,8 +30,8 @@ static const char *const columns[] = {"time_s", "valve1", "valve2",  "valve3",  
 enum { TIME, DUTY, READING = 4, POSITION = 7, TURN = 10, COLUMNS = 14 };
 
 static struct table_file table;
-static char directory[] = "/tmp/tribend-test-XXXXXX";
-static char log_path[RUNS][80], page_path[80];
+static char directory[SCRATCH_BYTES];
+static char log_path[RUNS][SCRATCH_WITHIN_BYTES], page_path[SCRATCH_WITHIN_BYTES];
 
 /* --- recordings: the plant with creep, driven openly --- */
 
@@ -114,7 +115,7 @@ static void write_logs(bool duties, bool turns) {
 
 static int set_up(void **state) {
     (void)state;
-    if (table_file_open(&table, TABLE, NULL) != 0 || mkdtemp(directory) == NULL) {
+    if (table_file_open(&table, TABLE, NULL) != 0 || !scratch_folder(directory)) {
         return -1;
     }
     for (size_t run = 0; run < RUNS; run++) {

@@ -13,16 +13,17 @@
 #include "log/rotation.h"
 #include "log/run_columns.h"
 #include "log/run_log.h"
+#include "support/scratch.h"
 
 #define DEGREES (180.0 / M_PI)
 #define ERROR_BYTES 1024
 
-static char directory[] = "/tmp/tribend-import-XXXXXX";
-static char source_path[64], mapping_path[64], run_path[64];
+static char directory[SCRATCH_BYTES];
+static char source_path[SCRATCH_WITHIN_BYTES], mapping_path[SCRATCH_WITHIN_BYTES], run_path[SCRATCH_WITHIN_BYTES];
 
 static int set_up(void **state) {
     (void)state;
-    if (mkdtemp(directory) == NULL) {
+    if (!scratch_folder(directory)) {
         return -1;
     }
     (void)snprintf(source_path, sizeof source_path, "%s/source", directory);

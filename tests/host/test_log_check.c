@@ -9,14 +9,15 @@
 #include "gap/log_check.h"
 #include "log/run_log.h"
 #include "program/table_file.h"
+#include "support/scratch.h"
 
 #define TABLE "tables/paper-semicircle.tbt"
 #define COMMAND_BYTES 512
 
 static struct table_file table;
 static struct plant_parameters nominal;
-static char directory[] = "/tmp/tribend-test-XXXXXX";
-static char log_path[80];
+static char directory[SCRATCH_BYTES];
+static char log_path[SCRATCH_WITHIN_BYTES];
 static glob_t logs; /* two a case, of healthy columns */
 
 static void generate(const char *corpus, int count) {
@@ -32,7 +33,7 @@ static void generate(const char *corpus, int count) {
 static int set_up(void **state) {
     char pattern[COMMAND_BYTES];
     (void)state;
-    if (table_file_open(&table, TABLE, NULL) != 0 || mkdtemp(directory) == NULL) {
+    if (table_file_open(&table, TABLE, NULL) != 0 || !scratch_folder(directory)) {
         return -1;
     }
     plant_default_parameters(&nominal);

@@ -9,14 +9,15 @@
 #include "gap/plan_search.h"
 #include "plan/plan_file.h"
 #include "support/rig.h"
+#include "support/scratch.h"
 
 #define DEG (M_PI / 180.0)
 
-static char directory[] = "/tmp/tribend-plan-XXXXXX";
-static char plan_path[64], report_path[64];
+static char directory[SCRATCH_BYTES];
+static char plan_path[SCRATCH_WITHIN_BYTES], report_path[SCRATCH_WITHIN_BYTES];
 
 static int set_up(void **state) {
-    if (mkdtemp(directory) == NULL) {
+    if (!scratch_folder(directory)) {
         return -1;
     }
     (void)snprintf(plan_path, sizeof plan_path, "%s/plan.yaml", directory);

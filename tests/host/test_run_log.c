@@ -5,14 +5,15 @@
 
 #include "log/run_log.h"
 #include "report/run_summary.h"
+#include "support/scratch.h"
 #include "units/units.h"
 
-static char directory[] = "/tmp/tribend-test-XXXXXX";
-static char path[64], aside[80];
+static char directory[SCRATCH_BYTES];
+static char path[SCRATCH_WITHIN_BYTES], aside[SCRATCH_WITHIN_BYTES + 8];
 
 static int set_up(void **state) {
     (void)state;
-    if (mkdtemp(directory) == NULL) {
+    if (!scratch_folder(directory)) {
         return -1;
     }
     (void)snprintf(path, sizeof path, "%s/run.csv", directory);

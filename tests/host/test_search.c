@@ -4,6 +4,7 @@
 #include <time.h>
 
 #include "gap/report.h"
+#include "support/scratch.h"
 
 #define SECONDS 6.0
 #define RUNS 2
@@ -112,8 +113,8 @@ static void gain_of_all_sensors_is_not_taken_for_another(void **state) {
 /* --- threads, a stop --- */
 
 static void write_json(char *text) {
-    char path[] = "/tmp/tribend-test-XXXXXX", error[512];
-    const int file = mkstemp(path);
+    char path[SCRATCH_BYTES], error[512];
+    const int file = scratch_file(path);
     assert_true(file >= 0 && close(file) == 0);
     if (!gap_report_json(diagnosis, &diagnosed.data, path, error, sizeof error)) {
         fail_msg("%s", error);

@@ -5,6 +5,7 @@
 
 #include "description/module_description.h"
 #include "material/material_fit.h"
+#include "support/scratch.h"
 
 static const struct material yeoh = {.law = MATERIAL_YEOH, .terms = 3, .coefficient_pa = {8000.0, 120.0, -0.9},
                                      .bulk_modulus_pa = 1e9};
@@ -251,7 +252,7 @@ static void too_little_data_is_refused(void **state) {
 
 static void tensile_files_good_and_bad(void **state) {
     (void)state;
-    char path[] = "/tmp/tribend-tensile-XXXXXX", error[256] = "";
+    char path[SCRATCH_BYTES], error[256] = "";
     const char *const header = "PARAMETER;INFO\nL\xe4nge;33\nTime (s);True Strain;True Stress (MPa);Engineering "
                                "Strain;Engineering Stress (MPa)\n";
     const struct {
@@ -264,7 +265,7 @@ static void tensile_files_good_and_bad(void **state) {
                  {12, "0.1;0.01;0.001;0.01\n", 0},
                  {12, "0.1;0.01;0.001;0.01;abc\n", 0},
                  {12, "0.1;0.01;0.001;nan;0.001\n", 0}};
-    const int file = mkstemp(path);
+    const int file = scratch_file(path);
     assert_true(file >= 0);
     assert_int_equal(close(file), 0);
     for (size_t i = 0; i < sizeof cases / sizeof cases[0]; i++) {

@@ -7,19 +7,20 @@
 
 #include "model/ccx/solid_model.h"
 #include "section/section_bend.h"
+#include "support/scratch.h"
 
 #define BULK_RATIO 200.0
 
-static char folder[] = "/tmp/tribend-solid-XXXXXX";
+static char folder[SCRATCH_BYTES];
 
 static int make_folder(void **state) {
     (void)state;
-    return mkdtemp(folder) != NULL ? 0 : -1;
+    return scratch_folder(folder) ? 0 : -1;
 }
 
 static int remove_folder(void **state) {
     static const char *const files[] = {"inp", "dat", "frd", "sta", "cvg", "12d"};
-    char path[128];
+    char path[SCRATCH_WITHIN_BYTES];
     (void)state;
     for (size_t i = 0; i < sizeof files / sizeof files[0]; i++) {
         (void)snprintf(path, sizeof path, "%s/solid.%s", folder, files[i]);

@@ -6,13 +6,14 @@
 
 #include "calibration/stiffness_fit.h"
 #include "section/section_solver.h"
+#include "support/scratch.h"
 
-static char path[] = "/tmp/tribend-plateaus-XXXXXX";
+static char path[SCRATCH_BYTES];
 static const struct plateau_options how = {.jump_pa = 3000.0, .rows_least = 20, .loaded_pa = 5000.0};
 
 static int make_file(void **state) {
     (void)state;
-    const int file = mkstemp(path);
+    const int file = scratch_file(path);
     return file >= 0 && close(file) == 0 ? 0 : -1;
 }
 
