@@ -6,12 +6,15 @@
 #include <string.h>
 
 #include "control/crc32.h"
+#include "messages/message_words.h"
 #include "program/output_file.h"
 
 #define FORMAT_KEY "tribend-parameters"
 
+enum moment { VENTED, ANY_TIME, START };
 static const struct parameter_words words[PARAMETER_COUNT] = {
-#define PARAMETER(id, name, type, member, unit, least, most, when, comment) {#name, unit, comment},
+#define PARAMETER(id, name, type, member, unit, least, most, when, comment)                                  \
+    {#name, sizeof unit == 2 && unit[0] == '1' ? "" : " " unit, comment, (when) == START},
 #include "comms/parameters.def"
 };
 
@@ -32,7 +35,7 @@ bool parameter_by_name(const char *name, enum parameter_index *parameter) {
 double parameter_number(enum parameter_index parameter, uint32_t value) {
     float real = 0.0f;
     memcpy(&real, &value, sizeof real);
-    return parameter_row(parameter)->type == PARAMETER_TYPE_REAL ? (double)real : (double)value;
+    return parameter_row(parameter)->type == PARAMETER_TYPE_REAL ? message_decimal(real) : (double)value;
 }
 
 bool parameter_from_number(enum parameter_index parameter, double number, uint32_t *value, char *error,
@@ -44,7 +47,7 @@ bool parameter_from_number(enum parameter_index parameter, double number, uint32
     const float real = (float)number;
     if (!((is_real ? (double)real : number) >= least && (is_real ? (double)real : number) <= most) ||
         (!is_real && number != floor(number))) {
-        (void)snprintf(error, error_bytes, "%s: %.9g is no %snumber from %.9g to %.9g %s",
+        (void)snprintf(error, error_bytes, "%s: %.9g is no %snumber from %.9g to %.9g%s",
                        words[parameter].name, number, is_real ? "" : "whole ", least, most,
                        words[parameter].unit);
         return false;
