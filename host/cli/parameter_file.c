@@ -14,12 +14,16 @@
 enum moment { VENTED, ANY_TIME, START };
 static const struct parameter_words words[PARAMETER_COUNT] = {
 #define PARAMETER(id, name, type, member, unit, least, most, when, comment)                                  \
-    {#name, sizeof unit == 2 && unit[0] == '1' ? "" : " " unit, comment, (when) == START},
+    {#name, " " unit, comment, (when) == START},
 #include "comms/parameters.def"
 };
 
 const struct parameter_words *parameter_words(enum parameter_index parameter) {
     return &words[parameter];
+}
+
+const char *parameter_unit(enum parameter_index parameter) {
+    return strcmp(words[parameter].unit, " 1") == 0 ? "" : words[parameter].unit;
 }
 
 bool parameter_by_name(const char *name, enum parameter_index *parameter) {
@@ -49,7 +53,7 @@ bool parameter_from_number(enum parameter_index parameter, double number, uint32
         (!is_real && number != floor(number))) {
         (void)snprintf(error, error_bytes, "%s: %.9g is no %snumber from %.9g to %.9g%s",
                        words[parameter].name, number, is_real ? "" : "whole ", least, most,
-                       words[parameter].unit);
+                       parameter_unit(parameter));
         return false;
     }
     if (is_real) {

@@ -16,12 +16,14 @@ struct parameter_values {
 
 struct parameter_words {
     const char *name;
-    const char *unit; /* with a space before it; "" where it has none */
+    const char *unit; /* with a space before it */
     const char *comment;
     bool holds_from_start; /* from the board's next start on, if it is saved */
 };
 
 const struct parameter_words *parameter_words(enum parameter_index parameter);
+/* " kPa"; "" where it has none. */
+const char *parameter_unit(enum parameter_index parameter);
 /* False: there is none of this name. */
 bool parameter_by_name(const char *name, enum parameter_index *parameter);
 /* Of a real one the shortest decimal that is the same float. */
