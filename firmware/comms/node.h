@@ -43,8 +43,7 @@
     X(BROADCAST, "only VENT and IDENTIFY go to every board")                                                 \
     X(DUPLICATE_NODE, "another board on the bus has this node's id")                                         \
     X(CONTROLLER,                                                                                            \
-      "a cause of the fault is still there, or commands that went on through a fault or a restart must pause "  \
-      "for 0.5 s")
+      "a cause of the fault is still there, or commands must first pause for 0.5 s, as after a restart")
 enum node_refusal {
 #define NODE_REFUSAL_ENUM(NAME, text) NODE_REFUSED_##NAME,
     NODE_REFUSALS(NODE_REFUSAL_ENUM) NODE_REFUSAL_COUNT
