@@ -50,8 +50,8 @@ struct hal {
     /* The next tip sample that arrived since the last call; false: none. Bounded by the caller to a few a
      * step. */
     bool (*read_tip)(void *context, struct hal_tip_sample *sample);
-    /* False: an output could not be set. A board feeds its watchdog here, and only when all were set: what cannot be set
-     * ends in a reset, which vents. */
+    /* False: an output could not be set. A board feeds its watchdog here, and only when all were set: what
+     * cannot be set ends in a reset, which vents. */
     bool (*write_outputs)(void *context, const struct hal_outputs *outputs);
     /* NULL: a board that has nothing to say of itself. */
     void (*read_health)(void *context, struct hal_health *health);
@@ -80,6 +80,7 @@ struct hal_can_state {
 /* A CAN controller, classic and FD. It recovers from bus-off by itself and counts that. */
 struct hal_bus {
     void *context;
+    bool fd; /* it carries frames of up to 64 bytes, as it was brought up; else classic ones alone */
     /* The next frame that arrived; false: none. Frames for other nodes may be among them. */
     bool (*receive)(void *context, struct hal_can_frame *frame);
     /* False: no room to send (counted in transmit_lost), or a frame that the bus cannot carry. */

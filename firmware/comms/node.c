@@ -386,9 +386,10 @@ static bool is_pending(const struct node *node, enum report_index report) {
     return (node->pending & 1u << report) != 0u;
 }
 
-/* In FD mode TELEMETRY stands for the bundled ones, else it is not sent. */
+/* In FD mode TELEMETRY stands for the bundled ones, else it is not sent. The bus as it is decides, not the
+ * parameter, which holds from the next start on. */
 static bool is_used(const struct node *node, enum report_index report) {
-    const bool fd = node->parameters.node.can_fd != 0u;
+    const bool fd = node->setup->bus != NULL && node->setup->bus->fd;
     return report == REPORT_TELEMETRY ? fd : !(fd && reports[report].bundled);
 }
 

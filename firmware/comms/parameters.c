@@ -16,6 +16,7 @@
 /* --- the table */
 
 #define VENTED true
+#define START true
 #define ANY_TIME false
 #define REAL_LEAST(x) (x)
 #define REAL_WHOLE(x) 0u

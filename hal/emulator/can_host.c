@@ -50,7 +50,7 @@ bool can_host_join(struct can_host *host, struct can_bus *bus) {
                                        .received = node_received,
                                        .changed = node_changed,
                                        .bit_ticks = TICKS_PER_SECOND / 1000000,
-                                       .data_bit_ticks = TICKS_PER_SECOND / 5000000,
+                                       .data_bit_ticks = TICKS_PER_SECOND / 2000000,
                                        .online = true};
     return can_bus_join(bus, &host->node);
 }

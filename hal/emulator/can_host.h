@@ -24,7 +24,7 @@ struct can_host {
     uint64_t heard_lost, refused; /* nobody took them in time; no room to send */
 };
 
-/* 1 Mbit/s, data of FD frames at 5 Mbit/s. False: no room on the bus. */
+/* 1 Mbit/s, data of FD frames at 2 Mbit/s: what boards come with. False: no room on the bus. */
 bool can_host_join(struct can_host *host, struct can_bus *bus);
 /* False: no room. */
 bool can_host_send(struct can_host *host, const struct hal_can_frame *frame);

@@ -265,6 +265,7 @@ bool can_start(uint32_t clock_hz, const struct can_settings *settings, struct ha
         return false;
     }
     fd_enabled = settings->fd && set_data_timing(clock_hz, settings->data_bit_rate);
+    bus->fd = fd_enabled;
     clear_memory();
     set_filters(settings);
     FDCAN1->txbc = 0u; /* first in, first out */

@@ -6,6 +6,7 @@
 #include "cli/commands.h"
 
 #define WITHIN_US 1000000
+#define WORDS_BYTES 512
 
 static const char usage[] =
     "Keep the pressures that the module has now, which another host commanded, until --for is "
@@ -26,8 +27,9 @@ static int hold(struct bus *bus, const struct bus_options *options, struct link_
             return bus_gone(bus, options);
         }
         if (report->status.state == SUPERVISOR_FAULT) {
-            return program_fail(EXIT_FAULT,
-                                "the controller went to FAULT and vented (tribend status says why)");
+            char words[WORDS_BYTES];
+            cli_describe_faults(report->status.faults, words, sizeof words);
+            return program_fail(EXIT_FAULT, "the controller went to FAULT and vented: %s", words);
         }
         if (!held && report->status.state == SUPERVISOR_HOLD) {
             held = true;

@@ -6,17 +6,24 @@
 #include <string.h>
 
 #include "control/crc32.h"
+#include "messages/message_words.h"
 #include "program/output_file.h"
 
 #define FORMAT_KEY "tribend-parameters"
 
+enum moment { VENTED, ANY_TIME, START };
 static const struct parameter_words words[PARAMETER_COUNT] = {
-#define PARAMETER(id, name, type, member, unit, least, most, when, comment) {#name, unit, comment},
+#define PARAMETER(id, name, type, member, unit, least, most, when, comment)                                  \
+    {#name, " " unit, comment, (when) == START},
 #include "comms/parameters.def"
 };
 
 const struct parameter_words *parameter_words(enum parameter_index parameter) {
     return &words[parameter];
+}
+
+const char *parameter_unit(enum parameter_index parameter) {
+    return strcmp(words[parameter].unit, " 1") == 0 ? "" : words[parameter].unit;
 }
 
 bool parameter_by_name(const char *name, enum parameter_index *parameter) {
@@ -32,7 +39,7 @@ bool parameter_by_name(const char *name, enum parameter_index *parameter) {
 double parameter_number(enum parameter_index parameter, uint32_t value) {
     float real = 0.0f;
     memcpy(&real, &value, sizeof real);
-    return parameter_row(parameter)->type == PARAMETER_TYPE_REAL ? (double)real : (double)value;
+    return parameter_row(parameter)->type == PARAMETER_TYPE_REAL ? message_decimal(real) : (double)value;
 }
 
 bool parameter_from_number(enum parameter_index parameter, double number, uint32_t *value, char *error,
@@ -44,9 +51,9 @@ bool parameter_from_number(enum parameter_index parameter, double number, uint32
     const float real = (float)number;
     if (!((is_real ? (double)real : number) >= least && (is_real ? (double)real : number) <= most) ||
         (!is_real && number != floor(number))) {
-        (void)snprintf(error, error_bytes, "%s: %.9g is no %snumber from %.9g to %.9g %s",
+        (void)snprintf(error, error_bytes, "%s: %.9g is no %snumber from %.9g to %.9g%s",
                        words[parameter].name, number, is_real ? "" : "whole ", least, most,
-                       words[parameter].unit);
+                       parameter_unit(parameter));
         return false;
     }
     if (is_real) {

@@ -16,13 +16,17 @@ struct parameter_values {
 
 struct parameter_words {
     const char *name;
-    const char *unit;
+    const char *unit; /* with a space before it */
     const char *comment;
+    bool holds_from_start; /* from the board's next start on, if it is saved */
 };
 
 const struct parameter_words *parameter_words(enum parameter_index parameter);
+/* " kPa"; "" where it has none. */
+const char *parameter_unit(enum parameter_index parameter);
 /* False: there is none of this name. */
 bool parameter_by_name(const char *name, enum parameter_index *parameter);
+/* Of a real one the shortest decimal that is the same float. */
 double parameter_number(enum parameter_index parameter, uint32_t value);
 /* False: no value of this parameter's type within its bounds; `error` says which there are. */
 bool parameter_from_number(enum parameter_index parameter, double number, uint32_t *value, char *error,

@@ -50,8 +50,7 @@ static void print_one(const struct arguments *arguments, enum parameter_index p,
     if (arguments->json) {
         printf("  \"%s\": %.9g%s\n", words->name, parameter_number(p, value), last ? "" : ",");
     } else {
-        printf("%-24s %14.9g %-8s %s\n", words->name, parameter_number(p, value), words->unit,
-               words->comment);
+        printf("%-24s %14.9g%-9s %s\n", words->name, parameter_number(p, value), parameter_unit(p), words->comment);
     }
 }
 
@@ -78,9 +77,11 @@ static int run_set(struct bus *bus, const struct arguments *arguments) {
     if (code != EXIT_OK) {
         return code;
     }
+    const struct parameter_words *words = parameter_words(p);
     if (end == arguments->word[2] || *end != '\0') {
-        return program_fail(EXIT_USAGE, "'%s' is no number; parameters are in %s", arguments->word[2],
-                            parameter_words(p)->unit);
+        return program_fail(EXIT_USAGE, "'%s' is no number: %s takes one%s%s, without the unit",
+                            arguments->word[2], words->name, *parameter_unit(p) != '\0' ? " in" : "",
+                            parameter_unit(p));
     }
     if (!parameter_from_number(p, number, &value, error, sizeof error)) {
         return program_fail(EXIT_USAGE, "%s", error);
@@ -92,8 +93,9 @@ static int run_set(struct bus *bus, const struct arguments *arguments) {
     if (result == CAN_BOARD_REFUSED) {
         return refused(arguments->word[1], status);
     }
-    printf("%s is %.9g %s until the board's next start; tribend params save keeps it\n", arguments->word[1],
-           parameter_number(p, value), parameter_words(p)->unit);
+    printf("%s %s %.9g%s %s tribend params save keeps it\n", words->name,
+           words->holds_from_start ? "will be" : "is", parameter_number(p, value), parameter_unit(p),
+           words->holds_from_start ? "from the board's next start on, if" : "until the board's next start;");
     return EXIT_OK;
 }
 
@@ -167,9 +169,9 @@ static int run_diff(struct bus *bus, const struct arguments *arguments) {
     for (uint32_t p = 0; p < (uint32_t)PARAMETER_COUNT && code == EXIT_OK; p++) {
         if (file.given[p] && file.value[p] != board.value[p]) {
             const enum parameter_index index = (enum parameter_index)p;
-            printf("%-24s board %.9g, file %.9g %s\n", parameter_words(index)->name,
+            printf("%-24s board %.9g, file %.9g%s\n", parameter_words(index)->name,
                    parameter_number(index, board.value[p]), parameter_number(index, file.value[p]),
-                   parameter_words(index)->unit);
+                   parameter_unit(index));
         }
     }
     return code;

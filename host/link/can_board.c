@@ -10,7 +10,7 @@
 #define TIMES 12
 #define BUSY_US 20000
 #define ALL_PARAMETERS 65535u
-#define CHUNK_US 500 /* two frames in a control step: the board takes three, and leaves room for commands */
+#define CHUNK_US 500 /* two frames in a control step: as many as the board takes */
 #define LATE_US 2000
 #define NUDGE_US 200000
 #define TRANSFER_PATIENCE_US 5000000

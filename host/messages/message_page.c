@@ -132,7 +132,7 @@ static void write_real(FILE *file, uint32_t bits) {
 }
 
 static void write_parameter(FILE *file, enum parameter_index index, const char *name, const char *unit,
-                            const char *comment, const struct parameters *defaults) {
+                            const char *when, const char *comment, const struct parameters *defaults) {
     const struct parameter_row *row = parameter_row(index);
     char least[32], most[32];
     uint32_t value = 0u;
@@ -148,7 +148,10 @@ static void write_parameter(FILE *file, enum parameter_index index, const char *
         write_whole_bounds(file, row);
     }
     (void)fprintf(file, " | %s | %s | %s |\n", strcmp(unit, "1") == 0 ? "" : unit,
-                  row->vented ? "vented" : "any time", comment);
+                  strcmp(when, "START") == 0 ? "vented; holds from the next start on"
+                  : row->vented              ? "vented"
+                                             : "any time",
+                  comment);
 }
 
 static void write_parameters(FILE *file) {
@@ -164,7 +167,7 @@ static void write_parameters(FILE *file) {
         "| --: | --- | --- | --- | --- | --- | --- |\n",
         PARAMETERS_VERSION);
 #define PARAMETER(id, name, type, member, unit, least, most, when, comment)                                  \
-    write_parameter(file, PARAMETER_##name, #name, unit, comment, &defaults);
+    write_parameter(file, PARAMETER_##name, #name, unit, #when, comment, &defaults);
 #include "comms/parameters.def"
 }
 

@@ -32,8 +32,7 @@ const struct message_field_words *message_field_words(uint32_t index) {
     return &fields[index];
 }
 
-/* The decimal number that the table shows, which no float is. */
-static double decimal_of(float value) {
+double message_decimal(float value) {
     char text[32];
     message_print_real(value, text);
     return strtod(text, NULL);
@@ -46,7 +45,7 @@ double message_field_number(uint32_t index, const union message *message) {
         float value = 0.0f;
         memcpy(&value, member, sizeof value);
         const double steps = round((double)((value - field->offset) / field->scale));
-        return steps * decimal_of(field->scale) + decimal_of(field->offset);
+        return steps * message_decimal(field->scale) + message_decimal(field->offset);
     }
     uint64_t value = 0u;
     memcpy(&value, member, field->width);

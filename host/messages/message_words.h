@@ -40,6 +40,8 @@ const struct message_field_words *message_field_words(uint32_t index);
 /* The value of field `index` of a message that was unpacked, as steps of the table's decimal scale; NaN: it
  * has none. */
 double message_field_number(uint32_t index, const union message *message);
+/* The shortest decimal number whose float this is: what a table shows, and no float is. */
+double message_decimal(float value);
 /* How many values have a name; 0 of plain numbers. */
 uint32_t message_values_count(enum message_values values);
 bool message_values_are_bits(enum message_values values);

@@ -847,7 +847,7 @@ static void with_can_fd_one_frame_says_it_all(void **state) {
     (void)state;
     struct message_telemetry telemetry;
     start();
-    assert_int_equal(set_parameter(CAN_FD, 1u).status, PARAMETER_OK);
+    bus.hal.fd = true;
     put_bend(0.6f, 0.5f);
     run_with_heartbeats(3000);
     sim_bus_forget(&bus);
@@ -871,6 +871,18 @@ static void with_can_fd_one_frame_says_it_all(void **state) {
     assert_int_equal(telemetry.protocol, MESSAGE_PROTOCOL);
     assert_true(telemetry.valves_enabled && telemetry.supply_enabled);
     assert_int_equal(node.counters.reported.out_of_range, 0);
+}
+
+/* A frame of 64 bytes that a classic bus cannot carry would stand before all others for ever. */
+static void can_fd_holds_from_the_next_start_on(void **state) {
+    (void)state;
+    start();
+    assert_int_equal(set_parameter(CAN_FD, 1u).status, PARAMETER_OK);
+    run(1000);
+    sim_bus_forget(&bus);
+    run(1000);
+    assert_int_equal(count_sent(MESSAGE_TELEMETRY), 0);
+    assert_in_range(count_sent(MESSAGE_PRESSURES), 199, 201);
 }
 
 static void the_state_of_the_bus_reaches_the_controller(void **state) {
@@ -1288,6 +1300,7 @@ int main(void) {
         cmocka_unit_test(a_slow_bus_starves_no_message),
         cmocka_unit_test(telemetry_slows_down_as_asked),
         cmocka_unit_test(with_can_fd_one_frame_says_it_all),
+        cmocka_unit_test(can_fd_holds_from_the_next_start_on),
         cmocka_unit_test(the_state_of_the_bus_reaches_the_controller),
         cmocka_unit_test(a_board_says_who_it_is),
         cmocka_unit_test(the_tip_stream_counters_are_reported),

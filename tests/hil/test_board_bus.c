@@ -1,4 +1,6 @@
 /* The flashed ELF on a bad or a busy CAN bus. */
+#include "comms/node.h"
+#include "comms/parameters.h"
 #include "hil/hil.h"
 
 static void start_bent(uint64_t seed) {
@@ -147,6 +149,42 @@ static void a_flood_of_the_highest_rank_vents(void **state) {
     hil_off();
 }
 
+static void set_can_fd(uint32_t value) {
+    const uint16_t id = parameter_row(PARAMETER_can_fd)->id;
+    const struct message_parameter_set set = {.protocol = MESSAGE_PROTOCOL, .parameter = id, .value = value};
+    hil_send(MESSAGE_PARAMETER_SET, &set, sizeof set);
+    hil_run(100);
+    assert_int_equal(hil.last[MESSAGE_PARAMETER_VALUE].parameter_value.status, PARAMETER_OK);
+}
+
+/* The parameter holds from the next start on: until then a frame of 64 bytes could not go, and nothing behind
+ * it. */
+static void can_fd_is_saved_and_carries_telemetry_after_the_next_start(void **state) {
+    (void)state;
+    hil_start(7);
+    set_can_fd(1u);
+    const uint32_t pressures = hil.heard[MESSAGE_PRESSURES];
+    hil_run(500);
+    assert_int_equal(hil.heard[MESSAGE_TELEMETRY], 0);
+    assert_in_range(hil.heard[MESSAGE_PRESSURES] - pressures, 99, 101);
+    const struct message_parameter_action save = {.protocol = MESSAGE_PROTOCOL, .action = NODE_ACTION_SAVE};
+    hil_send(MESSAGE_PARAMETER_ACTION, &save, sizeof save);
+    hil_run(500);
+    const struct message_reset reset = {.protocol = MESSAGE_PROTOCOL, .key = MESSAGE_RESET_KEY};
+    hil_send(MESSAGE_RESET, &reset, sizeof reset);
+    hil_run(500);
+    assert_int_equal(hil.board.resets, 1);
+    hil_bend(30.0, 20.0);
+    hil_run(1000);
+    memset(hil.heard, 0, sizeof hil.heard);
+    hil_run(1000);
+    assert_in_range(hil.heard[MESSAGE_TELEMETRY], 199, 201);
+    assert_int_equal(hil.heard[MESSAGE_PRESSURES], 0);
+    assert_close(hil_true_bend_deg(), 30.0, 1.0);
+    assert_false(hil.board.fdcan.node.bus_off);
+    hil_off();
+}
+
 int main(void) {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(shorted_wires_put_it_off_the_bus_until_they_are_mended),
@@ -156,6 +194,7 @@ int main(void) {
         cmocka_unit_test(on_a_full_bus_it_keeps_step_and_takes_its_commands),
         cmocka_unit_test(a_flood_for_every_board_is_read_and_thrown_away),
         cmocka_unit_test(a_flood_of_the_highest_rank_vents),
+        cmocka_unit_test(can_fd_is_saved_and_carries_telemetry_after_the_next_start),
     };
     return cmocka_run_group_tests(tests, hil_open_table, hil_close_table);
 }

@@ -104,10 +104,15 @@ gives 2 'it is: set NAME VALUE' params set tip_gain --bus "$bus"
 check parameter_without_value $?
 gives 2 'bus says where the board is' params list
 check parameters_of_the_simulation $?
+gives 0 'tip_gain is 0\.15 until' params set tip_gain 0.15 --bus "$bus" && gives 0 'saved' params save --bus "$bus"
+check parameters_saved $?
+gives 0 'node_id will be 9 from' params set node_id 9 --bus "$bus" && gives 0 'node 1' status --bus "$bus" &&
+    gives 0 'node_id will be 1 from' params set node_id 1 --bus "$bus"
+check what_holds_from_the_next_start_says_so $?
 gives 0 'wrote' params backup "$scratch/backup.json" --bus "$bus"
 check parameters_backed_up $?
 gives 0 'tip_gain is 0\.3' params set tip_gain 0.3 --bus "$bus"
-gives 0 'tip_gain +board 0\.30.*file 0\.15' params diff "$scratch/backup.json" --bus "$bus"
+gives 0 'tip_gain +board 0\.3, file 0\.15' params diff "$scratch/backup.json" --bus "$bus"
 check parameters_differ $?
 gives 0 'restored' params restore "$scratch/backup.json" --bus "$bus"
 check parameters_restored $?
@@ -137,10 +142,16 @@ gives 0 'table +on the board, module paper-semicircle' status --bus "$bus"
 check and_the_old_one_runs $?
 gives 2 'with which table' update --bus "$bus"
 check update_without_a_table $?
-gives 0 'runs +table' update tables/paper-semicircle.tbt -q --bus "$bus"
+# of few nodes: the reference table takes half a minute at one frame a control step
+"$build/tribend-tables" build paper-semicircle --nodes 4 --mesh-size 1.5mm -q -o "$scratch/small.tbt" >"$scratch/out" 2>"$scratch/err"
+gives 0 'runs +table' update "$scratch/small.tbt" -q --bus "$bus"
 check table_is_sent_and_runs_after_a_new_start $?
+gives 0 'tip_gain +0\.15 ' params get tip_gain --bus "$bus"
+check saved_parameters_outlast_the_new_start $?
 gives 0 '"state":"SAFE"' monitor --json --for 0.3s --bus "$bus"
 check monitor_as_json $?
+stop
+start "$scratch/bus"
 
 # --- Ctrl-C vents, or holds and then vents
 "$tribend" bend 30deg --for 20s -q --bus "$bus" >"$scratch/out" 2>"$scratch/err" &
@@ -177,6 +188,20 @@ check vent_over_another_host $?
 wait $host
 [ $? -eq 9 ] && grep -q 'another host vented it' "$scratch/first"
 check first_host_says_that_it_was_vented $?
+
+# --- a motion is taken over and held, until the one who holds it vents
+: >"$scratch/states"
+"$tribend" bend 30deg --for 20s -q --bus "$bus" >"$scratch/first" 2>&1 &
+host=$!
+until_seen ACTIVE "$scratch/states"
+sleep 0.5
+gives 0 'holding +[0-9.-]+ [0-9.-]+ [0-9.-]+ kPa.*|venting +state SAFE' hold --for 1s --bus "$bus"
+check hold_takes_over_and_vents_at_its_end $?
+grep -q 'holding' "$scratch/out" && grep -q 'HOLD' "$scratch/states" && tail -1 "$scratch/states" | grep -q SAFE
+check what_is_held_is_held_on_the_board $?
+wait $host
+[ $? -eq 9 ] && grep -q 'another host' "$scratch/first"
+check host_whose_motion_was_taken_over_says_so $?
 
 # --- the host is killed: the module vents by itself, and says why
 : >"$scratch/states"
