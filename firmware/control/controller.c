@@ -74,15 +74,19 @@ static float capacity_of(const struct controller *controller, const struct bend_
     return parameters->tube_volume_m3 + length_m * (volume_m2 + pressure_pa_abs * real_max(gradient[c], 0.0f));
 }
 
-/* The next `count` chambers', at the estimated pressures. */
+/* The next `count` chambers', at the estimated pressures. Beyond the table's end a chamber grows at least as fast as at it:
+ * taken for rigid there, it would be held above that end unseen. */
 static void update_capacities(struct controller *controller, uint32_t count) {
-    const float pressure_pa[3] = {controller->pressure_loop[0].estimate_pa, controller->pressure_loop[1].estimate_pa,
-                                  controller->pressure_loop[2].estimate_pa};
+    const struct bend_table *table = controller->table;
     struct bend_table_stencil stencil;
-    if (controller->table == NULL) {
+    float pressure_pa[3];
+    if (table == NULL) {
         return;
     }
-    bend_table_locate(controller->table, pressure_pa, &stencil);
+    for (uint32_t c = 0; c < 3u; c++) {
+        pressure_pa[c] = real_min(controller->pressure_loop[c].estimate_pa, table->axis_pa[c][table->nodes[c] - 1u]);
+    }
+    bend_table_locate(table, pressure_pa, &stencil);
     for (uint32_t i = 0; i < count; i++) {
         const uint32_t c = controller->capacity_next;
         controller->capacity_m3[c] = capacity_of(controller, &stencil, c);
