@@ -27,6 +27,12 @@ static float cross(const float a[2], const float b[2]) {
 
 /* --- the cell --- */
 
+/* Once a pressure was as high as it may be, the answer may lie anywhere on the edge of what is allowed. */
+static void note_ceiling(struct bend_inverse *inverse) {
+    inverse->capped = inverse->capped || inverse->pressure_pa[0] >= inverse->ceiling_pa ||
+                      inverse->pressure_pa[1] >= inverse->ceiling_pa;
+}
+
 /* How far the lead pushes at a node: its share of the bend, but for a factor. */
 static inline float lead_push_at(const struct bend_inverse *inverse, uint32_t lead, uint32_t follow) {
     float curvature[2];
@@ -119,6 +125,7 @@ static void find_start(struct bend_inverse *inverse) {
     bracket(inverse, BEND_PLANE_FOLLOW, j);
     inverse->pressure_pa[0] = between(inverse, BEND_PLANE_LEAD, i, real_clamp(lead, -1.0f, 2.0f));
     inverse->pressure_pa[1] = between(inverse, BEND_PLANE_FOLLOW, j, real_clamp(follow, -1.0f, 2.0f));
+    note_ceiling(inverse);
 }
 
 /* --- the request --- */
@@ -160,6 +167,7 @@ void bend_inverse_begin(struct bend_inverse *inverse, const struct bend_table *t
     inverse->steps = 0u;
     inverse->turned = false;
     inverse->cornered = false;
+    inverse->capped = false;
     inverse->found = false;
     inverse->length_m = table->module.active_length_m;
     inverse->wanted = bends ? real_min(size_rad, limit_rad) / inverse->length_m : 0.0f;
@@ -344,6 +352,7 @@ static void improve(struct bend_inverse *inverse, const struct bend_plane_point 
     const bool far = residual_rad > RESIDUAL_ACCEPTED_RAD, under = standing.under[0] || standing.under[1];
     inverse->pressure_pa[0] = step_within(inverse, 0u, step_pa[0]);
     inverse->pressure_pa[1] = step_within(inverse, 1u, step_pa[1]);
+    note_ceiling(inverse);
     if (far && standing.over) {
         inverse->stage = BEND_INVERSE_LEAVE;
     } else if (far && under && !inverse->turned) {
@@ -413,7 +422,7 @@ bool bend_inverse_preview(const struct bend_inverse *inverse, float pressure_pa[
         }
         return true;
     }
-    if (inverse->stage == BEND_INVERSE_SEARCH &&
+    if (inverse->stage == BEND_INVERSE_SEARCH && !inverse->capped &&
         bend_plane_cell_is_valid(plane, bend_plane_cell(plane, BEND_PLANE_LEAD, inverse->pressure_pa[0]),
                                  bend_plane_cell(plane, BEND_PLANE_FOLLOW, inverse->pressure_pa[1]))) {
         pressure_pa[plane->chamber[BEND_PLANE_LEAD]] = inverse->pressure_pa[0];

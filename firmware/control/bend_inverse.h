@@ -62,6 +62,7 @@ struct bend_inverse {
     uint32_t lead;             /* chamber */
     bool turned;               /* the neighbouring pair of chambers was tried */
     bool cornered;             /* the other edge was tried */
+    bool capped;               /* a pressure reached the ceiling on the way */
     enum bend_plane_role edge; /* whose pressure is kept on the edge */
     uint32_t cell[2];          /* on the walk */
     /* the best point so far */
@@ -79,7 +80,7 @@ void bend_inverse_begin(struct bend_inverse *inverse, const struct bend_table *t
  * third as a rule finds that so. */
 bool bend_inverse_step(struct bend_inverse *inverse);
 /* Pressures to go to already: the answer where it is done, else as far as start and Newton have come if that is within
- * the limits and the valid domain. False: there are none yet. */
+ * the limits and the valid domain, and no pressure had to be cut on the way. False: there are none yet. */
 bool bend_inverse_preview(const struct bend_inverse *inverse, float pressure_pa[3]);
 /* The answer once it is done. */
 void bend_inverse_finish(const struct bend_inverse *inverse, struct bend_inverse_result *result);

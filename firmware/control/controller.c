@@ -74,7 +74,8 @@ static float capacity_of(const struct controller *controller, const struct bend_
     return parameters->tube_volume_m3 + length_m * (volume_m2 + pressure_pa_abs * real_max(gradient[c], 0.0f));
 }
 
-/* The next `count` chambers', at the estimated pressures. Beyond the table's axis a chamber is as soft as at its end. */
+/* The next `count` chambers', at the estimated pressures. Beyond the table's end a chamber grows at least as fast as at it:
+ * taken for rigid there, it would be held above that end unseen. */
 static void update_capacities(struct controller *controller, uint32_t count) {
     const struct bend_table *table = controller->table;
     struct bend_table_stencil stencil;
@@ -83,8 +84,7 @@ static void update_capacities(struct controller *controller, uint32_t count) {
         return;
     }
     for (uint32_t c = 0; c < 3u; c++) {
-        pressure_pa[c] = real_clamp(controller->pressure_loop[c].estimate_pa, table->axis_pa[c][0],
-                                    table->axis_pa[c][table->nodes[c] - 1u]);
+        pressure_pa[c] = real_min(controller->pressure_loop[c].estimate_pa, table->axis_pa[c][table->nodes[c] - 1u]);
     }
     bend_table_locate(table, pressure_pa, &stencil);
     for (uint32_t i = 0; i < count; i++) {
@@ -502,9 +502,7 @@ static void aim_at_bend(struct controller *controller) {
         controller->inverting = false;
         bend_inverse_finish(inversion, &controller->status.inverse);
     }
-    /* out of reach, Newton's way to the edge of what is allowed leads past it */
-    const bool wanders = controller->inverting && controller->status.inverse.flags != 0u;
-    if (wanders || !bend_inverse_preview(inversion, wanted_pa)) {
+    if (!bend_inverse_preview(inversion, wanted_pa)) {
         return; /* the targets stay until there are better ones */
     }
     for (uint32_t c = 0; c < 3u; c++) {

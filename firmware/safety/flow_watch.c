@@ -9,6 +9,7 @@
 #define KEPT 0.9995f /* of a sum in each step: it fades within 2 s */
 #define KEPT_WEAK 0.9997f
 #define MOST 1.5f        /* sums stop growing there, so that a fault that is gone can be cleared */
+#define OWED_STEPS 25.0f /* of the present fall, that a reading which lags by 0.1 s still shows */
 #define LAG_STEPS 80.0f /* with lag_share: a reading or a valve that is up to 50 ms late */
 
 void flow_watch_default_parameters(struct flow_watch_parameters *parameters) {
@@ -75,7 +76,8 @@ uint32_t flow_watch_step(struct flow_watch *watch, const struct flow_watch_param
     }
     if (view->estimate_pa < parameters->vents_above_pa) {
         watch->kept_pa = 0.0f;
-    } else if (sum_up(&watch->kept_pa, KEPT, change_pa - keeps_pa - rises_pa, most_pa)) {
+    } else if (sum_up(&watch->kept_pa, KEPT, change_pa - keeps_pa - rises_pa,
+                      most_pa + OWED_STEPS * positive(-watch->net_pa))) {
         faults |= 1u << FAULT_VALVE_NOT_VENTING;
     }
     if (sum_up(&watch->missing_pa, KEPT, -change_pa - misses_pa - falls_pa, parameters->missing_pa)) {

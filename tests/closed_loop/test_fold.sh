@@ -27,8 +27,9 @@ both=$scratch/both.tbt
 "$build/tribend-tables" build paper-circle --material ecoflex-0030-c30-positive --nodes 4 --mesh-size 1.5mm -q -o "$both" >"$scratch/said" || cat "$scratch/said"
 check table_has_both_stable_branches 'balloons at 3[12][0-9]{2} Pa; it falls back at (29|30)[0-9]{2} Pa' "$build/tribend-tables" show "$both"
 check bend_inside 'warnings +none' "$build/tribend" bend 8deg --for 3s -q --table "$table"
+# next to the fold a few pascals of a sensor's noise bend the module by degrees: a gap of the body may be seen, none of a valve
 for toward in 0 30 75 180; do
-    check "bend_beyond_toward_$toward" 'out of reach' "$build/tribend" bend 60deg --toward "${toward}deg" --for 3s -q --table "$table"
+    check "bend_beyond_toward_$toward" 'warnings +the command was out of reach: the nearest reachable one is followed(, gap between module and model in body: .*)?$' "$build/tribend" bend 60deg --toward "${toward}deg" --for 3s -q --table "$table"
 done
 # At the table's end the chambers are as soft as they get and the noise is as it falls: no fault, and the direction that was asked for.
 beyond() { # SEED TOWARD-DEG

@@ -103,6 +103,7 @@ static inline void recording_write_run(const struct recording *recording, size_t
         run_log_append(&log, &report, &command); /* every step: the duty of the last one before a period's start acts */
     }
     link.close(link.context);
+    assert_int_equal(report.status.faults, 0); /* a sensor that lags is no broken valve */
     assert_int_equal(report.status.state, SUPERVISOR_ACTIVE);
     assert_true(run_log_finish(&log, error, sizeof error));
 }
