@@ -746,25 +746,6 @@ static bool fit_everything(struct search *search) {
     return sound;
 }
 
-/* What changes pressures only slightly shows best at the tip, once the pressures are taken to be what the duties make of them:
- * near ninety degrees a few pascals turn it more than its sensor errs. */
-static bool look_closer(struct search *search, struct workspace *room) {
-    search->replay.rigid = true;
-    search->trials = 0;
-    room->singles = 0;
-    const struct gap_model plain = {.stiffness_scale = 1.0, .supply_scale = 1.0};
-    search->nominal.model = plain;
-    bool sound = recalibrate(search, &search->nominal, false) && recalibrate(search, &search->recalibrated, true);
-    search->best = search->recalibrated;
-    for (size_t step = 0; step < 2 && sound && !stopped(search) && is_structured(&search->best); step++) {
-        if (!add_one(search, room, step)) {
-            break;
-        }
-        sound = recalibrate(search, &search->best, true);
-    }
-    return sound;
-}
-
 /* Repeated samples are seen as such: no fit has to find them. They count where the poses are better explained by them: a
  * log that is written more often than the sensor measures has them too. */
 static bool take_repeats(struct search *search, size_t step) {
@@ -925,6 +906,25 @@ static bool search_after_onset(struct search *search, struct workspace *room) {
     if (!sound || least.model.count == 0 || share_left(search) > left) {
         search->best = before;
         sound = sound && recalibrate(search, &search->best, true);
+    }
+    return sound;
+}
+
+/* What changes pressures only slightly shows best at the tip, once the pressures are taken to be what the duties make of them:
+ * near ninety degrees a few pascals turn it more than its sensor errs. */
+static bool look_closer(struct search *search, struct workspace *room) {
+    search->replay.rigid = true;
+    search->trials = 0;
+    room->singles = 0;
+    const struct gap_model plain = {.stiffness_scale = 1.0, .supply_scale = 1.0};
+    search->nominal.model = plain;
+    bool sound = recalibrate(search, &search->nominal, false) && recalibrate(search, &search->recalibrated, true);
+    search->best = search->recalibrated;
+    for (size_t step = 0; step < 2 && sound && !stopped(search) && is_structured(&search->best); step++) {
+        if (!add_one(search, room, step)) {
+            break;
+        }
+        sound = recalibrate(search, &search->best, true) && (step > 0 || search_after_onset(search, room));
     }
     return sound;
 }
