@@ -1,6 +1,6 @@
 # A bend of 60 degrees over a real CAN socket, and what the board then says of its bend (units of 1e-4 rad, low byte first).
 build/tribend board --bus vcan0 --quiet &
-sleep 1
+sleep 2
 for sequence in {1..20}; do
     cansend vcan0 "$(printf '051#%02X01E82800000000' "$sequence")"
 done

@@ -393,12 +393,14 @@ static bool is_used(const struct node *node, enum report_index report) {
     return report == REPORT_TELEMETRY ? fd : !(fd && reports[report].bundled);
 }
 
-/* One that is still unsent when it is due again has lost a turn. */
+/* One that is still unsent when it is due again has lost a turn; one that waits because something changed has
+ * not. */
 static void fall_due(struct node *node, enum report_index report) {
     if (!is_used(node, report)) {
         return;
     }
-    node->counters.reports_dropped += is_pending(node, report) ? 1u : 0u;
+    node->counters.reports_dropped += node->due >> report & 1u;
+    node->due |= 1u << report;
     want(node, report);
 }
 
@@ -474,6 +476,7 @@ static void note_changes(struct node *node) {
 /* After a report went: some have more to say, or say another thing next time. */
 static void note_sent(struct node *node, enum report_index report) {
     node->pending &= ~(1u << report);
+    node->due &= ~(1u << report);
     if (report == REPORT_REFUSALS) {
         node->refusal_next = (node->refusal_next + 1u) % (uint32_t)NODE_REFUSAL_COUNT;
     } else if (report == REPORT_TRANSFER_STATE) {

@@ -43,7 +43,7 @@
     X(BROADCAST, "only VENT and IDENTIFY go to every board")                                                 \
     X(DUPLICATE_NODE, "another board on the bus has this node's id")                                         \
     X(CONTROLLER,                                                                                            \
-      "a cause of the fault is still there, or commands that went on through a fault must pause for 0.5 s")
+      "a cause of the fault is still there, or commands must first pause for 0.5 s, as after a restart")
 enum node_refusal {
 #define NODE_REFUSAL_ENUM(NAME, text) NODE_REFUSED_##NAME,
     NODE_REFUSALS(NODE_REFUSAL_ENUM) NODE_REFUSAL_COUNT
@@ -120,7 +120,8 @@ struct node {
     uint32_t refused_before; /* by the controller */
     uint32_t timeout_steps;
     struct hal_can_state bus_state;
-    uint32_t pending; /* reports to send, a bit each */
+    uint32_t pending; /* reports to send, a bit each, */
+    uint32_t due;     /* and those of them whose period has passed */
     uint32_t next_report;
     bool took_commands; /* in this step */
     uint32_t countdown[NODE_REPORT_COUNT];

@@ -102,12 +102,21 @@ static void keep(struct tip_stream *stream, const struct hal_tip_sample *sample)
     stream->queued++;
 }
 
+/* No sensor is well, at the transmitter's very centre and turned by nothing: this record was never filled. */
+static bool is_blank(const uint8_t *record) {
+    uint32_t bits = word_of(record, WORD_STATUS);
+    for (uint32_t word = WORD_X; word <= WORD_ROLL; word++) {
+        bits |= word_of(record, word);
+    }
+    return bits == 0u;
+}
+
 static void take_record(struct tip_stream *stream) {
     const uint8_t *record = stream->record;
     const int32_t elevation = signed_word_of(record, WORD_ELEVATION);
     struct hal_tip_sample sample;
     float angle_rad[3];
-    if (elevation > ELEVATION_MOST || elevation < -ELEVATION_MOST) {
+    if (elevation > ELEVATION_MOST || elevation < -ELEVATION_MOST || is_blank(record)) {
         stream->counters.out_of_range++;
         return;
     }

@@ -30,7 +30,7 @@ struct tip_stream_counters {
     uint32_t records;       /* understood */
     uint32_t bad_phasing;   /* bytes outside of a record */
     uint32_t short_records; /* that another one, or a pause, cut off */
-    uint32_t out_of_range;  /* an elevation over 90 degrees: no sensor sends it */
+    uint32_t out_of_range;  /* an elevation over 90 degrees, or a good pose of zeros: no sensor sends it */
     uint32_t overflow;      /* samples that nobody read in time: the oldest goes */
 };
 

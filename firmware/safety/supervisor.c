@@ -87,17 +87,22 @@ static bool obey(struct supervisor *supervisor, int64_t time_us, enum supervisor
 }
 
 static void advance(struct supervisor *supervisor, int64_t time_us, bool healthy) {
+    const int64_t selftest_us = supervisor->started ? SUPERVISOR_SELFTEST_US : SUPERVISOR_PAUSE_US;
     if (supervisor->state == SUPERVISOR_BOOT) {
         enter(supervisor, SUPERVISOR_SELFTEST, time_us);
     } else if (supervisor->state == SUPERVISOR_SELFTEST && healthy &&
-               time_us - supervisor->entered_us >= SUPERVISOR_SELFTEST_US) {
+               time_us - supervisor->entered_us >= selftest_us) {
         supervisor->armed = false;
+        supervisor->started = true;
         enter(supervisor, SUPERVISOR_SAFE, time_us);
     }
 }
 
 bool supervisor_step(struct supervisor *supervisor, int64_t time_us, uint32_t present, bool healthy,
                      enum supervisor_request request) {
+    if (supervisor->state == SUPERVISOR_BOOT) {
+        supervisor->motion_us = time_us; /* for all it knows, a stream is flying */
+    }
     if (present != 0u) {
         supervisor->faults |= present;
         supervisor->cause_us = time_us;

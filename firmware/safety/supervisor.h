@@ -3,8 +3,10 @@
  *
  * Pure: conditions and time in, state out. A fault is left on purpose only: by a clear, once its cause has
  * been gone for a while, that does not belong to a stream of clears; it leads through the self-test, and a
- * stream of motion commands that went on through all of that is refused until it has paused. Not here: how a
- * fault is detected (watch.h), what the valves do about it (controller.h). */
+ * stream of motion commands that went on through all of that is refused until it has paused. So is one that was
+ * flying when the board started: until it has been SAFE once, the self-test lasts as long as that pause, so that
+ * such a stream has been heard. Not here: how a fault is detected (watch.h), what the valves do about it
+ * (controller.h). */
 #ifndef TRIBEND_SUPERVISOR_H
 #define TRIBEND_SUPERVISOR_H
 
@@ -59,6 +61,7 @@ struct supervisor {
     enum supervisor_state state;
     uint32_t faults;    /* latched, bit = enum supervisor_fault */
     bool armed;         /* a motion command that began after the last self-test was taken */
+    bool started;       /* has been SAFE since it was switched on */
     int64_t entered_us; /* when the state was entered */
     int64_t cause_us;   /* when a cause of a fault was last present */
     int64_t motion_us;  /* when a motion command last came, taken or not */

@@ -11,7 +11,7 @@
 
 #define STEP_BOUND 10000u
 #define INVERSION_BOUND 2500u
-#define STEPS 3000u
+#define STEPS 3500u
 #define INVERSIONS 500u
 #define DEGREES (180.0 / M_PI)
 

@@ -31,6 +31,18 @@ check bend_inside 'warnings +none' "$build/tribend" bend 8deg --for 3s -q --tabl
 for toward in 0 30 75 180; do
     check "bend_beyond_toward_$toward" 'warnings +the command was out of reach: the nearest reachable one is followed(, gap between module and model in body: .*)?$' "$build/tribend" bend 60deg --toward "${toward}deg" --for 3s -q --table "$table"
 done
+# At the table's end the chambers are as soft as they get and the noise is as it falls: no fault, and the direction that was asked for.
+beyond() { # SEED TOWARD-DEG
+    "$build/tribend" bend 60deg --toward "$2deg" --for 3s -q --table "$table" --seed "$1" >"$scratch/beyond" 2>&1 &&
+        grep -q 'warnings *the command was out of reach' "$scratch/beyond" &&
+        awk -v toward="$2" '/^direction/ { off = $2 - toward; seen = 1 } END { exit !(seen && off < 4 && off > -4) }' "$scratch/beyond"
+}
+for seed in {2..9}; do
+    for toward in 30 180; do
+        beyond "$seed" "$toward" || { echo "seed $seed toward $toward"; cat "$scratch/beyond"; wrong=1; }
+    done
+done
+check whatever_the_noise sound bash -c 'test -z "$1" && echo sound' - "${wrong:-}"
 check pressure_beyond 'out of reach' "$build/tribend" pressure 100mbar 0mbar 0mbar --for 3s -q --table "$table"
 check pressures_beyond 'out of reach' "$build/tribend" pressure 100mbar 100mbar 50mbar --for 3s -q --table "$table"
 echo "[  PASSED  ] $passed test(s)."

@@ -464,6 +464,30 @@ static void a_stream_that_went_on_through_a_fault_must_pause(void **state) {
     assert_int_equal(state_of_node(), SUPERVISOR_ACTIVE);
 }
 
+/* A board that restarts in mid motion: frames of the host that did not notice start nothing, however slowly they come. */
+static void a_stream_that_flew_at_a_restart_must_pause(void **state) {
+    (void)state;
+    static const int periods[] = {20, 100, 350, 490};
+    for (size_t p = 0; p < sizeof periods / sizeof periods[0]; p++) {
+        start();
+        power_up();
+        for (int i = 0; i < 3000; i++) {
+            if ((i + 30) % periods[p] == 0) {
+                put_bend(0.4f, 0.0f);
+            }
+            step();
+            assert_false(supervisor_valves_enabled(&node.app.controller.supervisor));
+        }
+        assert_int_equal(state_of_node(), SUPERVISOR_SAFE);
+        assert_int_equal(node.app.controller.status.faults, 0);
+        assert_true(node.refused[NODE_REFUSED_CONTROLLER].count >= 5u);
+        run(500);
+        put_bend(0.4f, 0.0f);
+        run(2);
+        assert_int_equal(state_of_node(), SUPERVISOR_ACTIVE);
+    }
+}
+
 static void a_clear_whose_cause_is_still_there_is_refused(void **state) {
     (void)state;
     start();
@@ -1279,6 +1303,7 @@ int main(void) {
         cmocka_unit_test(a_frozen_sender_keeps_nothing_alive),
         cmocka_unit_test(a_frozen_sender_starts_nothing_after_a_clear),
         cmocka_unit_test(a_stream_that_went_on_through_a_fault_must_pause),
+        cmocka_unit_test(a_stream_that_flew_at_a_restart_must_pause),
         cmocka_unit_test(a_clear_whose_cause_is_still_there_is_refused),
         cmocka_unit_test(after_a_pause_any_sequence_will_do),
         cmocka_unit_test(every_message_of_another_length_is_refused),

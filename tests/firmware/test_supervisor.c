@@ -12,7 +12,7 @@ static void run_to_safe(struct supervisor *supervisor) {
     supervisor_init(supervisor);
     for (int64_t time_us = 0; supervisor->state != SUPERVISOR_SAFE; time_us += 1000) {
         assert_true(supervisor_step(supervisor, time_us, 0u, true, SUPERVISOR_REQUEST_NONE));
-        assert_true(time_us < 100000);
+        assert_true(time_us <= SUPERVISOR_PAUSE_US);
     }
 }
 
@@ -25,11 +25,42 @@ static void start_goes_through_self_test_to_safe(void **state) {
     assert_false(supervisor_supply_enabled(&supervisor));
     (void)supervisor_step(&supervisor, 0, 0u, true, SUPERVISOR_REQUEST_NONE);
     assert_int_equal(supervisor.state, SUPERVISOR_SELFTEST);
-    (void)supervisor_step(&supervisor, SUPERVISOR_SELFTEST_US - 1, 0u, true, SUPERVISOR_REQUEST_NONE);
+    (void)supervisor_step(&supervisor, SUPERVISOR_PAUSE_US - 1, 0u, true, SUPERVISOR_REQUEST_NONE);
     assert_int_equal(supervisor.state, SUPERVISOR_SELFTEST);
-    (void)supervisor_step(&supervisor, SUPERVISOR_SELFTEST_US, 0u, true, SUPERVISOR_REQUEST_NONE);
+    (void)supervisor_step(&supervisor, SUPERVISOR_PAUSE_US, 0u, true, SUPERVISOR_REQUEST_NONE);
     assert_int_equal(supervisor.state, SUPERVISOR_SAFE);
     assert_false(supervisor_valves_enabled(&supervisor));
+    (void)supervisor_step(&supervisor, 1000000, 1u, true, SUPERVISOR_REQUEST_NONE); /* the next one is short */
+    (void)supervisor_step(&supervisor, 2000000, 0u, true, SUPERVISOR_REQUEST_CLEAR);
+    (void)supervisor_step(&supervisor, 2000000 + SUPERVISOR_SELFTEST_US - 1, 0u, true, SUPERVISOR_REQUEST_NONE);
+    assert_int_equal(supervisor.state, SUPERVISOR_SELFTEST);
+    (void)supervisor_step(&supervisor, 2000000 + SUPERVISOR_SELFTEST_US, 0u, true, SUPERVISOR_REQUEST_NONE);
+    assert_int_equal(supervisor.state, SUPERVISOR_SAFE);
+}
+
+/* A board that restarts while motion commands fly, of any period that the command timeout allows: none of them starts it,
+ * before they have paused. Its clock starts wherever it likes. */
+static void a_stream_that_flew_at_the_start_is_refused(void **state) {
+    (void)state;
+    const int64_t starts_us[] = {0, -700000, 3600000000};
+    for (int64_t period_ms = 1; period_ms < SUPERVISOR_PAUSE_US / 1000; period_ms += 6) {
+        for (int64_t phase_ms = 0; phase_ms < period_ms; phase_ms += 1 + period_ms / 12) {
+            struct supervisor supervisor;
+            const int64_t start_us = starts_us[period_ms % 3];
+            supervisor_init(&supervisor);
+            int64_t last_ms = 0;
+            for (int64_t ms = 0; ms < 3000; ms++) {
+                const bool comes = (ms + phase_ms) % period_ms == 0;
+                const enum supervisor_request request = comes ? SUPERVISOR_REQUEST_MOVE : SUPERVISOR_REQUEST_NONE;
+                last_ms = comes ? ms : last_ms;
+                assert_true(supervisor_step(&supervisor, start_us + 1000 * ms, 0u, true, request) != comes);
+                assert_false(supervisor_valves_enabled(&supervisor));
+            }
+            const int64_t paused_us = start_us + 1000 * last_ms + SUPERVISOR_PAUSE_US;
+            assert_true(supervisor_step(&supervisor, paused_us, 0u, true, SUPERVISOR_REQUEST_MOVE));
+            assert_int_equal(supervisor.state, SUPERVISOR_ACTIVE);
+        }
+    }
 }
 
 static void an_unhealthy_module_stays_in_self_test(void **state) {
@@ -47,18 +78,18 @@ static void moves_and_holds_and_vents(void **state) {
     (void)state;
     struct supervisor supervisor;
     run_to_safe(&supervisor);
-    assert_false(supervisor_step(&supervisor, 1, 0u, true, SUPERVISOR_REQUEST_HOLD)); /* nothing to hold */
-    assert_true(supervisor_step(&supervisor, 2, 0u, true, SUPERVISOR_REQUEST_MOVE));
+    assert_false(supervisor_step(&supervisor, SUPERVISOR_PAUSE_US + 1, 0u, true, SUPERVISOR_REQUEST_HOLD)); /* nothing to hold */
+    assert_true(supervisor_step(&supervisor, SUPERVISOR_PAUSE_US + 2, 0u, true, SUPERVISOR_REQUEST_MOVE));
     assert_int_equal(supervisor.state, SUPERVISOR_ACTIVE);
     assert_true(supervisor_valves_enabled(&supervisor));
-    assert_true(supervisor_step(&supervisor, 3, 0u, true, SUPERVISOR_REQUEST_MOVE_ON));
-    assert_true(supervisor_step(&supervisor, 3, 0u, true, SUPERVISOR_REQUEST_HOLD));
+    assert_true(supervisor_step(&supervisor, SUPERVISOR_PAUSE_US + 3, 0u, true, SUPERVISOR_REQUEST_MOVE_ON));
+    assert_true(supervisor_step(&supervisor, SUPERVISOR_PAUSE_US + 3, 0u, true, SUPERVISOR_REQUEST_HOLD));
     assert_int_equal(supervisor.state, SUPERVISOR_HOLD);
-    assert_false(supervisor_step(&supervisor, 3, 0u, true, SUPERVISOR_REQUEST_MOVE_ON));
+    assert_false(supervisor_step(&supervisor, SUPERVISOR_PAUSE_US + 3, 0u, true, SUPERVISOR_REQUEST_MOVE_ON));
     assert_int_equal(supervisor.state, SUPERVISOR_HOLD);
-    assert_true(supervisor_step(&supervisor, 4, 0u, true, SUPERVISOR_REQUEST_MOVE));
+    assert_true(supervisor_step(&supervisor, SUPERVISOR_PAUSE_US + 4, 0u, true, SUPERVISOR_REQUEST_MOVE));
     assert_int_equal(supervisor.state, SUPERVISOR_ACTIVE);
-    assert_true(supervisor_step(&supervisor, 5, 0u, true, SUPERVISOR_REQUEST_VENT));
+    assert_true(supervisor_step(&supervisor, SUPERVISOR_PAUSE_US + 5, 0u, true, SUPERVISOR_REQUEST_VENT));
     assert_int_equal(supervisor.state, SUPERVISOR_SAFE);
     assert_false(supervisor_valves_enabled(&supervisor));
 }
@@ -91,6 +122,7 @@ static size_t number_of(const struct node *node) {
     size_t number = (size_t)s->state;
     number = number * FAULT_SETS + s->faults;
     number = number * 2 + (s->armed ? 1 : 0);
+    number = number * 2 + (s->started ? 1 : 0);
     number = number * 2 + (node->cleared ? 1 : 0);
     number = number * 2 + (node->tested ? 1 : 0);
     number = number * AGES + (size_t)age_of(s->entered_us);
@@ -137,6 +169,7 @@ static void check_step(const struct node *before, const struct event *event, con
     if (from->state == SUPERVISOR_SELFTEST && after->state != SUPERVISOR_SELFTEST) {
         assert_true(event->healthy);
         assert_true(after->state == SUPERVISOR_SAFE || event->request == SUPERVISOR_REQUEST_MOVE);
+        assert_true(from->started || age_of(from->entered_us) >= SUPERVISOR_PAUSE_US / TICK_US);
     }
     if (air && !supervisor_valves_enabled(from)) { /* a motion starts by a command of its own, never by a repetition, */
         assert_int_equal(event->request, SUPERVISOR_REQUEST_MOVE);
@@ -153,7 +186,7 @@ static void check_step(const struct node *before, const struct event *event, con
 
 static void every_reachable_state_and_every_input(void **state) {
     (void)state;
-    const size_t all = (size_t)SUPERVISOR_STATE_COUNT * FAULT_SETS * 8 * AGES * AGES * AGES * AGES;
+    const size_t all = (size_t)SUPERVISOR_STATE_COUNT * FAULT_SETS * 16 * AGES * AGES * AGES * AGES;
     bool *seen = calloc(all, sizeof *seen);
     struct node *queue = malloc(all * sizeof *queue);
     assert_non_null(seen);
@@ -318,6 +351,7 @@ static void a_round_of_the_table_check_ends_within_two_seconds(void **state) {
 int main(void) {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(start_goes_through_self_test_to_safe),
+        cmocka_unit_test(a_stream_that_flew_at_the_start_is_refused),
         cmocka_unit_test(an_unhealthy_module_stays_in_self_test),
         cmocka_unit_test(moves_and_holds_and_vents),
         cmocka_unit_test(every_reachable_state_and_every_input),

@@ -266,6 +266,34 @@ static void an_elevation_that_no_sensor_sends_is_refused(void **state) {
     assert_int_equal(stream.counters.out_of_range, 4);
 }
 
+/* Zeros are no pose, with phasing or without, whatever clock and quality say; with a status they tell that much. */
+static void zeros_are_no_pose(void **state) {
+    (void)state;
+    const struct hal_tip_sample good = pose(0.5, 1.0, 0.0);
+    struct hal_tip_sample last;
+    uint8_t record[RECORD] = {0};
+    start();
+    feed(record, RECORD, 0);
+    assert_int_equal(read_all(&last), 0);
+    assert_int_equal(stream.counters.bad_phasing, RECORD);
+    record[0] = 0x80u;
+    for (int i = 0; i < 50; i++) {
+        record[12] = (uint8_t)(40 * i % 128); /* the clock goes on */
+        record[14] = (uint8_t)i;
+        feed(record, RECORD, 10000 * (int64_t)(i + 1));
+        assert_int_equal(read_all(&last), 0);
+    }
+    assert_int_equal(stream.counters.out_of_range, 50);
+    assert_int_equal(stream.counters.records, 0);
+    record[16] = 0x04u; /* saturated */
+    feed(record, RECORD, 600000);
+    assert_int_equal(read_all(&last), 1);
+    assert_int_equal(last.status, 4);
+    feed_sample(&good, 610000);
+    assert_int_equal(read_all(&last), 1);
+    assert_under(angle_between(last.quaternion, good.quaternion), 1.51 * ANGLE_STEP_RAD + 2e-6);
+}
+
 /* Nobody reads, or the sensor sends ten times as often: the newest samples are kept, the others counted. */
 static void samples_that_nobody_reads_are_counted(void **state) {
     (void)state;
@@ -399,6 +427,7 @@ int main(void) {
         cmocka_unit_test(half_records_are_counted),
         cmocka_unit_test(records_without_phasing_are_counted_byte_by_byte),
         cmocka_unit_test(an_elevation_that_no_sensor_sends_is_refused),
+        cmocka_unit_test(zeros_are_no_pose),
         cmocka_unit_test(samples_that_nobody_reads_are_counted),
         cmocka_unit_test(any_bytes_are_accounted_for),
         cmocka_unit_test(uneven_arrival_hardly_moves_the_time),

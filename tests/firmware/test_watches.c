@@ -330,6 +330,21 @@ static void tip_compare(struct tip_bench *bench, double measured_rad, double pre
     tip_watch_follow(&bench->watch, &bench->parameters, &view, bench->correction_rad);
 }
 
+/* A sample that nobody filled has no rotation in it; nor has one that is no number. */
+static void a_sample_without_a_rotation_is_refused(void **state) {
+    (void)state;
+    const float scales[] = {0.0f, 0.5f, 2.0f, NAN};
+    for (size_t i = 0; i < sizeof scales / sizeof scales[0]; i++) {
+        struct tip_bench bench;
+        tip_start(&bench);
+        const float position_m[3] = {0.0f, 0.0f, 0.0f}, quaternion[4] = {scales[i], 0.0f, 0.0f, 0.0f};
+        const struct tip_watch_sample sample = {10000, position_m, quaternion, 0u};
+        assert_false(tip_watch_take(&bench.watch, &bench.parameters, &module, &sample));
+        bench.time_us = 10000;
+        assert_int_equal(tip_warnings(&bench), WARNING_BIT(TIP_ERRATIC));
+    }
+}
+
 static void bad_samples_are_refused_and_named(void **state) {
     (void)state;
     struct tip_bench bench;
@@ -415,6 +430,7 @@ int main(void) {
         cmocka_unit_test(time_that_stands_goes_back_or_jumps_is_a_clock_fault),
         cmocka_unit_test(the_supply_is_judged_once_it_is_open),
         cmocka_unit_test(bus_off_is_a_fault_only_while_moving),
+        cmocka_unit_test(a_sample_without_a_rotation_is_refused),
         cmocka_unit_test(bad_samples_are_refused_and_named),
         cmocka_unit_test(frozen_is_what_stands_still_while_the_table_moves),
         cmocka_unit_test(a_bend_that_means_too_much_pressure_is_a_disagreement),

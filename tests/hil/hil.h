@@ -15,7 +15,7 @@
 #define HIL_TABLE "tables/paper-semicircle.tbt"
 #define HIL_NODE 1u
 #define HIL_REPEAT_MS 50
-#define HIL_BOOT_MS 150
+#define HIL_BOOT_MS 650
 
 struct hil {
     struct board board;

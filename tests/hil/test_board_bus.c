@@ -172,7 +172,7 @@ static void can_fd_is_saved_and_carries_telemetry_after_the_next_start(void **st
     hil_run(500);
     const struct message_reset reset = {.protocol = MESSAGE_PROTOCOL, .key = MESSAGE_RESET_KEY};
     hil_send(MESSAGE_RESET, &reset, sizeof reset);
-    hil_run(500);
+    hil_run(HIL_BOOT_MS);
     assert_int_equal(hil.board.resets, 1);
     hil_bend(30.0, 20.0);
     hil_run(1000);

@@ -50,6 +50,13 @@ static size_t one_byte_lost(void *context, uint8_t bytes[WIRING_RECORD_BYTES], s
     return count - 1u;
 }
 
+static size_t zeros(void *context, uint8_t bytes[WIRING_RECORD_BYTES], size_t count) {
+    (void)context;
+    memset(bytes, 0, count);
+    bytes[0] = 0x80u;
+    return count;
+}
+
 /* Records understood: each is reported. */
 static uint32_t records(void) {
     return hil.heard[MESSAGE_TIP_POSITION];
@@ -105,14 +112,20 @@ static void lost_bytes_cost_their_record(void **state) {
     run_trouble("lost bytes", one_byte_lost, 4);
 }
 
+/* Right phasing, and nothing in it: no pose of a straight module. */
+static void records_of_zeros_are_thrown_away(void **state) {
+    (void)state;
+    run_trouble("zeros", zeros, 8);
+}
+
 /* One bad record between good ones costs at most itself and the next. */
 static void one_bad_record_costs_at_most_two(void **state) {
-    static const wiring_tamper troubles[] = {garbage, half_a_record, wrong_phase, one_byte_lost};
+    static const wiring_tamper troubles[] = {garbage, half_a_record, wrong_phase, one_byte_lost, zeros};
     (void)state;
     start_bent(5);
     for (int i = 0; i < 40; i++) {
         const uint32_t before = records();
-        hil.board.wiring.tamper = troubles[i % 4];
+        hil.board.wiring.tamper = troubles[i % 5];
         hil_run(RECORD_MS);
         hil.board.wiring.tamper = NULL;
         hil_run(10 * RECORD_MS);
@@ -159,6 +172,7 @@ int main(void) {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(random_bytes_are_thrown_away),     cmocka_unit_test(half_records_are_thrown_away),
         cmocka_unit_test(wrong_phasing_is_thrown_away),     cmocka_unit_test(lost_bytes_cost_their_record),
+        cmocka_unit_test(records_of_zeros_are_thrown_away),
         cmocka_unit_test(one_bad_record_costs_at_most_two), cmocka_unit_test(ten_times_the_rate_is_taken),
         cmocka_unit_test(a_babbling_sensor_is_no_load),
     };

@@ -148,7 +148,7 @@ gives 0 'runs +table' update "$scratch/small.tbt" -q --bus "$bus"
 check table_is_sent_and_runs_after_a_new_start $?
 gives 0 'tip_gain +0\.15 ' params get tip_gain --bus "$bus"
 check saved_parameters_outlast_the_new_start $?
-gives 0 '"state":"SAFE"' monitor --json --for 0.3s --bus "$bus"
+gives 0 '"state":"SAFE"' monitor --json --for 1s --bus "$bus"
 check monitor_as_json $?
 stop
 start "$scratch/bus"

@@ -26,6 +26,13 @@ board_start() {
     nice -n "${BOARD_NICE:-0}" "$tribend" board --elf "$elf" --bus vcan0 --record "$SCRATCH/$name.csv" "$@" >"$SCRATCH/$name.out" 2>&1 &
     board=$!
 }
+# board_ready: until the board that was just started has been through its self-test; what candump wrote of others is not it
+board_ready() {
+    local from
+    from=$(frames "10$node")
+    more() { [ "$(frames "10$node")" -ge $((from + 12)) ]; } # 0.6 s, a state at least every 50 ms
+    within 20 more && within 20 told_state 2
+}
 board_end() { # SIGNAL
     kill "-$1" "$board" 2>/dev/null
     wait "$board" 2>/dev/null

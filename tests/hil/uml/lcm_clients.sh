@@ -34,6 +34,8 @@ within 20 said bridge_1 'board *is heard'
 check bridge_hears_the_board $?
 "$mission" get 1 >"$SCRATCH/parameter" && grep -q 'value 1 status 0' "$SCRATCH/parameter"
 check parameter_over_lcm $?
+board_ready
+check board_is_ready $?
 lcm-logger -q -c 'TRIBEND_.*' "$SCRATCH/mission.lcm" >"$SCRATCH/logger.out" 2>&1 &
 logger=$!
 sleep 0.5
@@ -53,6 +55,7 @@ check nothing_was_dropped $?
 board_start second
 bridge_start bridge_2
 within 20 said bridge_2 'board *is heard'
+board_ready
 lcm-logplayer -e '^TRIBEND_COMMAND$' "$SCRATCH/mission.lcm" >"$SCRATCH/player.out" 2>&1
 check mission_is_replayed $?
 within 20 told_state $safe
