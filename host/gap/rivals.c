@@ -140,27 +140,40 @@ static int by_belief(const void *a, const void *b) {
     return (x < y) - (x > y);
 }
 
-/* The logarithm of how much less the rival's residuals of one group speak for it than the best one's. */
-static double misfit(const struct fit *rival, const struct fit *without, const struct fit *least,
-                     enum fit_group group) {
-    const struct fit_part *own = &rival->sums.part[1][group], *best = &least->sums.part[1][group];
-    const double count = fmax(best->count, 1.0), structure = fit_structure_of(&least->sums, 1, group);
-    const double noise = fmax(best->square / count - structure, 0.1);
-    const double taken_off = fmax(without->sums.part[1][group].square - best->square, 0.0);
-    return (own->square - best->square) /
+static double squares_of(const struct fit *fit, enum fit_group group) {
+    return fit->sums.part[1][group].square;
+}
+
+/* Of all rivals, the one that leaves least of a group. */
+static const struct fit *least_of(const struct rivals *rivals, const struct fit *best, enum fit_group group) {
+    const struct fit *least = best;
+    for (size_t i = 0; i < rivals->count; i++) {
+        const struct fit *fit = &rivals->rival[i].fit;
+        least = squares_of(fit, group) < squares_of(least, group) ? fit : least;
+    }
+    return least;
+}
+
+/* The logarithm of how much less the rival's residuals of one group speak for it than the best ones there: of
+ * two of which each explains a group that the other does not, neither is judged by what its own leaves over.
+ */
+static double misfit(const struct rivals *rivals, const struct fit *rival, const struct fit *without,
+                     const struct fit *best, enum fit_group group) {
+    const struct fit *least = least_of(rivals, best, group);
+    const double count = fmax(least->sums.part[1][group].count, 1.0),
+                 structure = fit_structure_of(&least->sums, 1, group);
+    const double noise = fmax(squares_of(least, group) / count - structure, 0.1);
+    const double taken_off = fmax(squares_of(without, group) - squares_of(least, group), 0.0);
+    return (squares_of(rival, group) - squares_of(least, group)) /
            (FORM_SHARE * taken_off + structure * count + NOISE_SQUARES * noise);
 }
 
 static void weigh(struct rivals *rivals, const struct fit *without, const struct fit *best) {
-    const struct fit *least = best;
     double sum = 0.0, most = -INFINITY;
     for (size_t i = 0; i < rivals->count; i++) {
-        least = held_out(&rivals->rival[i].fit) < held_out(least) ? &rivals->rival[i].fit : least;
-    }
-    for (size_t i = 0; i < rivals->count; i++) {
         struct rival *rival = &rivals->rival[i];
-        rival->belief = -misfit(&rival->fit, without, least, FIT_PRESSURE) -
-                        misfit(&rival->fit, without, least, FIT_TIP) -
+        rival->belief = -misfit(rivals, &rival->fit, without, best, FIT_PRESSURE) -
+                        misfit(rivals, &rival->fit, without, best, FIT_TIP) -
                         0.5 * log(parameters_of(&rival->fit.model, rival->kind));
         most = fmax(most, rival->belief);
     }

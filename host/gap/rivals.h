@@ -27,7 +27,7 @@ struct search;
  *
  * A kind is believed in proportion to exp(-sum of (squares - best one's) / scale) / sqrt(parameters), over pressures and tip. The
  * scale is what noise makes of the squares, plus a five hundredth of what the effect takes off, for what the form of a right
- * effect may be off by, plus what the best leaves beyond noise, by which forms are seen to be off. */
+ * effect may be off by, plus what the best there leaves beyond noise, by which forms are seen to be off. */
 bool rivals_find(struct search *search);
 
 #endif

@@ -14,6 +14,7 @@
 #define SCREEN_ROUNDS 1
 #define SCREEN_ROUNDS_CHEAP 3
 #define REFINE_ROUNDS 6
+#define THRESHOLD_ROUNDS 2
 #define NOMINAL_ROUNDS 6
 #define SETTLED_MAX 5         /* of the refined ones, the best, from a base of their own .. */
 #define SETTLE_ROUNDS 4
@@ -35,9 +36,13 @@
 #define ONSET_FINE_S 0.15     /* an onset is not sought closer than that */
 #define COMPLETING_SHARE 0.5  /* of what is left, that a further effect must explain */
 #define POLISH_SHARE 0.025    /* of the gap, in pressures or at the tip: less than that is left by any form of the right effect */
-#define FORM_LEAST 0.0005     /* of the gap: less than that no effect is sought for */
-#define MATERIAL_SHARE 0.0003 /* of the whole gap: the same for what is left in one place of a gap that lies in the other */
-#define WHOLE_SHARE 0.95      /* of such a small rest, that an effect must explain */
+#define FORM_LEAST 0.0005     /* of the gap: less than that is left by most forms of it, .. */
+#define TRACE_LEAST 0.00005   /* .. and less than that by all: no effect is sought for it */
+#define MATERIAL_SHARE 0.0003 /* of the whole gap: what is left in one place of a gap that lies in the other is form, .. */
+#define ELSEWHERE_SHARE 3e-5  /* .. down to that, if no simple effect explains it whole */
+#define WHOLE_SHARE 0.95      /* of such a small rest, that an effect must explain, .. */
+#define TRACE_SHARE 0.98      /* .. and of a trace */
+#define TRACE_SIGNAL 10.0     /* so many times what is worth explaining at all */
 #define STRUCTURE_LEAST 0.2   /* mean square in units of a block's noise that is worth explaining */
 #define FAINT_LEFT 0.25        /* of a faint gap: more than that left means that something else was meant */
 #define FAINT 1.5             /* mean square below which a first effect, too, must explain most of what there is */
@@ -373,11 +378,28 @@ static void settle(struct search *search, struct crew *crew, struct fit **order,
     qsort(order, count, sizeof *order, by_held_out); // NOLINT(bugprone-sizeof-expression): pointers are sorted
 }
 
+/* Derivatives do not lead to a threshold: single pulses lie on this side of it or on that. It is stepped to from both sides. */
+static void step_to_threshold(struct fitter *fitter, struct fit *fit) {
+    static const double steps[] = {0.96, 0.98, 0.99, 1.01, 1.02, 1.04};
+    for (size_t e = 0; e < fit->model.count; e++) {
+        const struct fit start = *fit;
+        for (size_t k = 0; k < sizeof steps / sizeof steps[0] && start.model.effect[e].kind->by_threshold; k++) {
+            struct fit trial = start;
+            trial.model.effect[e].parameter[0] *= steps[k];
+            fitter_run(fitter, &trial, THRESHOLD_ROUNDS, true);
+            if (trial.sound && fit_squares(&trial.sums, 0) < fit_squares(&fit->sums, 0)) {
+                *fit = trial;
+            }
+        }
+    }
+}
+
 static void refine(struct search *search, struct crew *crew, struct fit **order, size_t count, size_t step) {
 #pragma omp parallel for schedule(dynamic, 1) num_threads(crew->count)
     for (size_t i = 0; i < count; i++) {
         if (!stopped(search)) {
             fitter_run(&crew->fitter[omp_get_thread_num()], order[i], REFINE_ROUNDS, true);
+            step_to_threshold(&crew->fitter[omp_get_thread_num()], order[i]);
         }
     }
     qsort(order, count, sizeof *order, by_held_out); // NOLINT(bugprone-sizeof-expression): pointers are sorted
@@ -400,33 +422,46 @@ static bool is_better(const struct fit *before, const struct fit *after) {
     return gain > worth && gain > GAIN_SIGMA * noise;
 }
 
-/* Is there more left, in pressures or at the tip, than the noise and than that share of the gap? */
-static bool is_left(const struct search *search, const struct fit *fit, enum fit_group group, double share) {
+/* Is there more left, in pressures or at the tip, than the noise, than a share of the gap there and than one of the whole? */
+static bool is_left(const struct search *search, const struct fit *fit, enum fit_group group, double share, double of_whole) {
     const double all = fit_structure_of(&search->recalibrated.sums, 1, group);
-    const double least = fmax(share * all, MATERIAL_SHARE * structure(&search->recalibrated));
+    const double least = fmax(share * all, of_whole * structure(&search->recalibrated));
     return fit_structure_of(&fit->sums, 1, group) > fmax(STRUCTURE_LEAST, least);
 }
 
-static bool is_simple(const struct fit *fit) {
-    const struct effect_kind *last = fit->model.effect[fit->model.count - 1].kind;
+static size_t parts_of(const struct fit *fit, const struct effect_kind *kind) {
     size_t parts = 0;
     for (size_t e = 0; e < fit->model.count; e++) {
-        parts += fit->model.effect[e].kind == last;
+        parts += fit->model.effect[e].kind == kind;
     }
-    return parts == 1;
+    return parts;
+}
+
+/* What the second has and the first does not: the last such effect; the last of all where it has only more of the same. */
+static size_t added(const struct fit *before, const struct fit *after) {
+    size_t place = after->model.count - 1;
+    while (place > 0 && parts_of(before, after->model.effect[place].kind) > 0) {
+        place--;
+    }
+    return parts_of(before, after->model.effect[place].kind) > 0 ? after->model.count - 1 : place;
 }
 
 /* A further effect must be the rest of the explanation, of the pressures or of the tip; not polish on a form that only nearly
- * fits. A small rest may as well be the form: of that, a simple effect must explain nearly all. */
+ * fits. A small rest may as well be the form: of that, a simple effect must explain nearly all, as no form's error is likely to be
+ * just what another effect does. */
 static bool completes(const struct search *search, const struct fit *before, const struct fit *after) {
-    const struct effect_kind *last = after->model.effect[after->model.count - 1].kind;
+    const struct effect_kind *kind = after->model.effect[added(before, after)].kind;
+    const bool simple = parts_of(after, kind) == 1;
     bool any = false;
-    for (int g = gap_effect_upstream(last) ? FIT_PRESSURE : FIT_TIP; g < FIT_GROUPS; g++) {
+    for (int g = gap_effect_upstream(kind) ? FIT_PRESSURE : FIT_TIP; g < FIT_GROUPS; g++) {
         const enum fit_group group = (enum fit_group)g;
         const double left = fit_structure_of(&before->sums, 1, group), then = fit_structure_of(&after->sums, 1, group);
-        any = any || (is_left(search, before, group, POLISH_SHARE) && then < (1.0 - COMPLETING_SHARE) * left) ||
-              (is_left(search, before, group, FORM_LEAST) && is_simple(after) && left > 3.0 * STRUCTURE_LEAST &&
-               then < fmax((1.0 - WHOLE_SHARE) * left, STRUCTURE_LEAST));
+        const bool halves = then < (1.0 - COMPLETING_SHARE) * left;
+        const bool whole = left > 3.0 * STRUCTURE_LEAST && then < fmax((1.0 - WHOLE_SHARE) * left, STRUCTURE_LEAST);
+        const bool trace = left > TRACE_SIGNAL * STRUCTURE_LEAST && then < (1.0 - TRACE_SHARE) * left;
+        any = any || (is_left(search, before, group, POLISH_SHARE, MATERIAL_SHARE) && halves) ||
+              (simple && ((is_left(search, before, group, FORM_LEAST, ELSEWHERE_SHARE) && whole) ||
+                                    (is_left(search, before, group, TRACE_LEAST, ELSEWHERE_SHARE) && trace)));
     }
     return any;
 }
@@ -449,8 +484,8 @@ static bool earns_place(const struct search *search, const struct fit *before, c
         const bool all_of_it = structure(after) < FAINT_LEFT * structure(before);
         return is_better(before, after) && (all_of_it || structure(before) > FAINT);
     }
-    const struct effect_kind *last = after->model.effect[after->model.count - 1].kind;
-    const bool adds = last->forms_add || gap_model_is_part(&after->model, after->model.count - 1);
+    const size_t place = added(before, after);
+    const bool adds = after->model.effect[place].kind->forms_add || gap_model_is_part(&after->model, place);
     if (adds && gap_model_kinds(&after->model) <= gap_model_kinds(&before->model) && !repeats_kind(&after->model)) {
         return is_better(before, after); /* more of the same kind */
     }
@@ -711,25 +746,6 @@ static bool fit_everything(struct search *search) {
     return sound;
 }
 
-/* What changes pressures only slightly shows best at the tip, once the pressures are taken to be what the duties make of them:
- * near ninety degrees a few pascals turn it more than its sensor errs. */
-static bool look_closer(struct search *search, struct workspace *room) {
-    search->replay.rigid = true;
-    search->trials = 0;
-    room->singles = 0;
-    const struct gap_model plain = {.stiffness_scale = 1.0, .supply_scale = 1.0};
-    search->nominal.model = plain;
-    bool sound = recalibrate(search, &search->nominal, false) && recalibrate(search, &search->recalibrated, true);
-    search->best = search->recalibrated;
-    for (size_t step = 0; step < 2 && sound && !stopped(search) && is_structured(&search->best); step++) {
-        if (!add_one(search, room, step)) {
-            break;
-        }
-        sound = recalibrate(search, &search->best, true);
-    }
-    return sound;
-}
-
 /* Repeated samples are seen as such: no fit has to find them. They count where the poses are better explained by them: a
  * log that is written more often than the sensor measures has them too. */
 static bool take_repeats(struct search *search, size_t step) {
@@ -894,6 +910,25 @@ static bool search_after_onset(struct search *search, struct workspace *room) {
     return sound;
 }
 
+/* What changes pressures only slightly shows best at the tip, once the pressures are taken to be what the duties make of them:
+ * near ninety degrees a few pascals turn it more than its sensor errs. */
+static bool look_closer(struct search *search, struct workspace *room) {
+    search->replay.rigid = true;
+    search->trials = 0;
+    room->singles = 0;
+    const struct gap_model plain = {.stiffness_scale = 1.0, .supply_scale = 1.0};
+    search->nominal.model = plain;
+    bool sound = recalibrate(search, &search->nominal, false) && recalibrate(search, &search->recalibrated, true);
+    search->best = search->recalibrated;
+    for (size_t step = 0; step < 2 && sound && !stopped(search) && is_structured(&search->best); step++) {
+        if (!add_one(search, room, step)) {
+            break;
+        }
+        sound = recalibrate(search, &search->best, true) && (step > 0 || search_after_onset(search, room));
+    }
+    return sound;
+}
+
 static bool all_have_duties(const struct gap_data *data) {
     return has_everywhere(data, offsetof(struct gap_run, has_duty)) && data->run[0].tips > 0;
 }
@@ -923,8 +958,8 @@ bool search_run(struct search *search, const struct gap_data *data, const struct
         if (search->best.model.count + 3 > GAP_EFFECTS_MAX) {
             break;
         }
-        if (step > 0 && !is_left(search, &search->best, FIT_PRESSURE, FORM_LEAST) &&
-            !is_left(search, &search->best, FIT_TIP, FORM_LEAST)) {
+        if (step > 0 && !is_left(search, &search->best, FIT_PRESSURE, TRACE_LEAST, ELSEWHERE_SHARE) &&
+            !is_left(search, &search->best, FIT_TIP, TRACE_LEAST, ELSEWHERE_SHARE)) {
             break;
         }
         if (!add_one(search, room, step)) {

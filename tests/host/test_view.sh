@@ -108,6 +108,7 @@ chmod 600 "$scratch/token"
 serve --token-file "$scratch/token" --for 60s --record "$scratch/run.csv"
 curl -s -H "Authorization: Bearer 0123456789abcdefghij" "${address}module" | grep -q '"bus":"sim"'
 check token_file_opens $?
+sleep 1 # of motion to draw
 stop
 "$tribend" plot "$scratch/run.csv" -o "$scratch/run.png" >/dev/null 2>&1
 check recorded_run_can_be_drawn $?
