@@ -218,6 +218,9 @@ static void reopen(struct session *session, const struct bridge_now *now) {
     session->connected = transport_open(&session->bus, session->settings->bus, error, sizeof error);
     if (session->connected) {
         session->bridge.counters.bus_reopened++;
+        if (!session->settings->quiet) {
+            printf("bus        %s is back\n", session->settings->bus);
+        }
     } else {
         session->pause_us = 2 * session->pause_us < REOPEN_MOST_US ? 2 * session->pause_us : REOPEN_MOST_US;
         session->reopen_us = now->monotonic_us + session->pause_us;
