@@ -190,6 +190,10 @@ static void take_identity(struct can_link *link, enum message_id id, const union
         take_name(link, &message->identity_name);
     }
     identity->known = link->name_pieces == ALL_OF_IDENTITY;
+    if (identity->known && link->transport.listen_to != NULL) {
+        link->transport.listen_to(&link->transport,
+                                  link->node); /* who else is there was of interest till now */
+    }
 }
 
 /* What came back may be another firmware. */
@@ -279,7 +283,8 @@ static void take_error(struct can_link *link, uint32_t error_class) {
     link->counters.bus_off += (error_class & CAN_ERR_BUSOFF) != 0 ? 1u : 0u;
 }
 
-static void read_frames(struct can_link *link) {
+/* True: there are more. */
+static bool read_frames(struct can_link *link) {
     struct transport_frame frame;
     enum transport_result result = TRANSPORT_DONE;
     for (int i = 0; i < FRAMES_A_TURN && result == TRANSPORT_DONE; i++) {
@@ -292,9 +297,7 @@ static void read_frames(struct can_link *link) {
     }
     link->counters.overflowed = link->transport.overflowed;
     link->counters.malformed = link->transport.malformed;
-    if (result == TRANSPORT_GONE) {
-        (void)lose_bus(link);
-    }
+    return result == TRANSPORT_GONE ? lose_bus(link) : result == TRANSPORT_DONE;
 }
 
 /* --- the thread */
@@ -325,13 +328,15 @@ static void notice_silence(struct can_link *link, int64_t time_us) {
     }
 }
 
-static void turn(struct can_link *link) {
+/* True: frames are waiting already. */
+static bool turn(struct can_link *link) {
     const int64_t time_us = now_us();
+    bool more = false;
     if (!link->connected) {
         reopen(link, time_us);
     }
     if (link->connected) {
-        read_frames(link);
+        more = read_frames(link);
     }
     notice_silence(link, time_us);
     if (link->connected) {
@@ -341,6 +346,7 @@ static void turn(struct can_link *link) {
         ask(link, time_us);
     }
     (void)pthread_cond_broadcast(&link->changed);
+    return more;
 }
 
 static void *run(void *context) {
@@ -352,9 +358,7 @@ static void *run(void *context) {
     for (;;) {
         (void)pthread_mutex_lock(&link->lock);
         const bool stop = link->stop;
-        if (!stop) {
-            turn(link);
-        }
+        const bool more = !stop && turn(link);
         struct pollfd wait[3] = {{.fd = link->timer, .events = POLLIN},
                                  {.fd = link->wake, .events = POLLIN},
                                  {.fd = link->connected ? link->transport.descriptor : -1, .events = POLLIN}};
@@ -362,7 +366,7 @@ static void *run(void *context) {
         if (stop) {
             return NULL;
         }
-        (void)poll(wait, 3, -1);
+        (void)poll(wait, 3, more ? 0 : -1);
         for (int i = 0; i < 2; i++) { /* both are only there to wake */
             if ((wait[i].revents & POLLIN) != 0 && read(wait[i].fd, &count, sizeof count) < 0 &&
                 errno != EAGAIN) {

@@ -10,17 +10,13 @@
 #include "link/socketcan.h"
 
 static enum transport_result receive(struct transport *transport, struct transport_frame *frame) {
-    struct canfd_frame can;
     for (;;) {
-        const ssize_t size = recv(transport->descriptor, &can, sizeof can, 0);
-        if (size < 0 && errno == EINTR) {
-            continue;
-        }
-        if (size < 0) {
+        const struct can_batch_frame *read = can_batch_next(&transport->batch, transport->descriptor);
+        if (read == NULL) {
             return errno == EAGAIN ? TRANSPORT_NOTHING : TRANSPORT_GONE;
         }
-        if (socketcan_to_frame(&can, (size_t)size, frame)) {
-            frame->time_us = transport_now_us();
+        if (socketcan_to_frame(&read->can, read->bytes, frame)) {
+            frame->time_us = read->time_us;
             return TRANSPORT_DONE;
         }
         transport->malformed++;
