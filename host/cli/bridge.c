@@ -2,6 +2,7 @@
  */
 #include <errno.h>
 #include <inttypes.h>
+#include <jansson.h>
 #include <poll.h>
 #include <stdio.h>
 #include <string.h>
@@ -28,7 +29,7 @@ struct settings {
     struct bridge_logs_paths logs;
     int node;
     double duration_s; /* 0: until Ctrl-C */
-    bool quiet;
+    bool quiet, json;
 };
 
 static const struct argp_option options[] = {
@@ -43,6 +44,7 @@ static const struct argp_option options[] = {
     {"record", 'r', "FILE", 0, "write a run log (CSV); FILE.part until the end", 2},
     {"table", 't', "FILE", 0, "the board's bend table, named in the run log", 2},
     {"quiet", 'q', NULL, 0, "only the summary", 2},
+    {"json", 'j', NULL, 0, "for programs: only the summary, as one JSON object", 2},
     {0}};
 
 static void parse_duration(struct argp_state *state, const char *text, struct settings *settings) {
@@ -88,6 +90,9 @@ static error_t parse(int key, char *argument, struct argp_state *state) {
         return 0;
     case 't':
         settings->table = argument;
+        return 0;
+    case 'j':
+        settings->json = settings->quiet = true;
         return 0;
     case 'q':
         settings->quiet = true;
@@ -336,6 +341,23 @@ static void summarise(const struct session *session) {
     printf("clock      %zu windows, drift %.1f ppm\n", bridge->clock.windows, 1e6 * bridge->clock.drift);
 }
 
+static int print_json(const struct bridge *bridge) {
+    json_t *object = json_object(), *counters = json_object();
+#define BRIDGE_COUNTER(name, text)                                                                           \
+    (void)json_object_set_new(counters, #name, json_integer((json_int_t)bridge->counters.name));
+    BRIDGE_COUNTERS(BRIDGE_COUNTER)
+#undef BRIDGE_COUNTER
+    (void)json_object_set_new(object, "counters", counters);
+    (void)json_object_set_new(object, "latency_median_us", json_integer(latency_of(&bridge->latency, 0.5)));
+    (void)json_object_set_new(object, "latency_p99_us", json_integer(latency_of(&bridge->latency, 0.99)));
+    (void)json_object_set_new(object, "clock_windows", json_integer((json_int_t)bridge->clock.windows));
+    (void)json_object_set_new(object, "clock_drift_ppm", json_real(1e6 * bridge->clock.drift));
+    const int failed = json_dumpf(object, stdout, JSON_INDENT(2) | JSON_REAL_PRECISION(9));
+    json_decref(object);
+    printf("\n");
+    return failed == 0 ? EXIT_OK : program_fail(EXIT_OUTPUT, "cannot write to standard output");
+}
+
 static int run(struct session *session) {
     const int64_t end_us = session->settings->duration_s > 0.0
                                ? clock_us(CLOCK_MONOTONIC) + (int64_t)(1e6 * session->settings->duration_s)
@@ -348,9 +370,13 @@ static int run(struct session *session) {
     const struct bridge_now now = present();
     bridge_vent(&session->bridge, &now);
     const bool whole = bridge_logs_close(&session->logs, error, sizeof error);
-    summarise(session);
     if (!whole) {
         return program_fail(EXIT_OUTPUT, "%s", error);
+    }
+    if (!session->settings->json) {
+        summarise(session);
+    } else if (print_json(&session->bridge) != EXIT_OK) {
+        return EXIT_OUTPUT;
     }
     return session->settings->duration_s > 0.0 && program_interrupted != 0 ? EXIT_INTERRUPTED : EXIT_OK;
 }
@@ -381,7 +407,7 @@ static int open_logs(struct session *session) {
 static int open_lcm(struct session *session) {
     session->lcm = lcm_create(session->settings->url);
     if (session->lcm == NULL || !subscribe(session)) {
-        return program_fail(EXIT_SOLVER,
+        return program_fail(EXIT_BUS,
                             "LCM at %s: cannot be opened. An URL looks like " URL_DEFAULT
                             "; multicast needs a route (as root: ip route add 224.0.0.0/4 dev lo)",
                             session->settings->url != NULL ? session->settings->url : "its default URL");
@@ -395,7 +421,7 @@ static int use(struct session *session) {
     char error[PROGRAM_ERROR_BYTES];
     bridge_init(&session->bridge, (uint32_t)session->settings->node, &out, &now);
     if (!open_bus(session, error, sizeof error)) {
-        return program_fail(EXIT_SOLVER, "%s", error);
+        return program_fail(EXIT_BUS, "%s", error);
     }
     int code = open_logs(session);
     code = code == EXIT_OK ? open_lcm(session) : code;

@@ -74,8 +74,11 @@ bool unix_bus_open(struct transport *transport, const char *path, char *error, s
     transport->send = send_frame;
     transport->close = close_socket;
     if (connect(transport->descriptor, (const struct sockaddr *)&peer, sizeof peer) != 0) {
-        return refuse(path, "no board listens there (start one: tribend board --bus unix:PATH)", error,
-                      error_bytes);
+        return refuse(path,
+                      errno == EACCES
+                          ? "no permission (it is another user's board, or folder: ask for write permission)"
+                          : "no board listens there (start one: tribend board --bus unix:PATH)",
+                      error, error_bytes);
     }
     /* connected, the socket would refuse what others than the peer send, a board that was started anew among
      * them */
