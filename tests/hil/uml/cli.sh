@@ -63,12 +63,13 @@ bend_start $bend_60
 within 20 told_state 3
 "$tribend" hold --bus vcan0 --for 3s >"$SCRATCH/said.out" 2>"$SCRATCH/said.err" &
 holding=$!
-within 20 told_state 4
-check hold_takes_over_from_cansend $?
-bend_stop
 wait $holding
-[ $? -eq 0 ] && grep -q 'venting' "$SCRATCH/said.out"
-check and_vents_at_its_end $?
+[ $? -eq 0 ] && grep -q 'holding' "$SCRATCH/said.out" && grep -q 'venting' "$SCRATCH/said.out"
+check hold_takes_over_from_cansend_and_vents_at_its_end $?
+bend_stop
+has_held() { field_values "10$node" 0 1 | awk '$1 % 16 == 4 { held = 1 } END { exit !held }'; }
+within 10 has_held
+check board_was_in_hold $?
 
 # a fault that stays until it is cleared
 bend_start $bend_60
