@@ -35,7 +35,15 @@
 #define SEQUENCE_FLIPS 2u
 #define SEQUENCE_HALF 128u
 #define REFUSED_STEPS 150 /* a refusal within so many control steps of the last TIME is a new one */
-#define SEQUENCE_OVER 64u /* beyond another host's: it is refused from then on, we are not */
+/* Ahead of another host's sequence by so much it is refused from then on, and we are not. Half a turn ahead
+ * would look like behind: before that the lead is taken anew, in leaps that the board still takes for steps
+ * forward. */
+#define SEQUENCE_OVER 64u
+#define LEAD_LEAST 16u
+#define LEAD_MOST 96u
+#define LEAP 80u
+#define LEAPS 2u
+#define OTHER_HOST_US 1000000
 #define PROTOCOL_MASK 15u
 
 static int64_t now_us(void) {
@@ -208,7 +216,8 @@ static void forget_identity(struct can_link *link) {
 static void take_refusal(struct can_link *link, const struct message_refusals *refusal) {
     const int16_t ahead = (int16_t)(uint16_t)(refusal->step - link->assembly.step);
     if (refusal->count > 0 && refusal->reason == NODE_REFUSED_STALE && ahead > -REFUSED_STEPS &&
-        ahead < REFUSED_STEPS && link->commanded_us > 0 && link->sequence_flips < SEQUENCE_FLIPS) {
+        ahead < REFUSED_STEPS && link->commanded_us > 0 && link->sequence_flips < SEQUENCE_FLIPS &&
+        now_us() - link->other_host_us > OTHER_HOST_US) { /* else the stale one is that host */
         link->sequence_flips++;
         link->sequence = (uint8_t)(link->sequence + SEQUENCE_HALF);
         link->repeat_us = 0;
@@ -243,11 +252,29 @@ static void take_message(struct can_link *link, enum message_id id, const union 
     }
 }
 
-/* Another host's command to our board: our next sequence goes over it. */
+static void leap(struct can_link *link, uint8_t theirs) {
+    const union message nothing = {0};
+    for (uint32_t l = 0; l < LEAPS; l++) {
+        link->sequence = (uint8_t)(link->sequence + LEAP);
+        (void)send_message(link, MESSAGE_HOST_HEARTBEAT, &nothing);
+    }
+    link->sequence = (uint8_t)(theirs + SEQUENCE_OVER);
+}
+
+/* Another host's command to our board: our next sequence stays over it. What we said before is never gone
+ * behind, or the board would take us for the stale one. */
 static void take_other_host(struct can_link *link, enum message_id id, const struct hal_can_frame *frame) {
+    const uint8_t theirs = frame->data[0];
+    const uint8_t lead = (uint8_t)(link->sequence - theirs);
     link->counters.other_hosts++;
-    if (message_row(id)->number < message_row(MESSAGE_STATUS)->number) {
-        link->sequence = (uint8_t)(frame->data[0] + SEQUENCE_OVER);
+    if (message_row(id)->number >= message_row(MESSAGE_STATUS)->number) {
+        return;
+    }
+    link->other_host_us = now_us();
+    if (lead > LEAD_MOST && lead < SEQUENCE_HALF && is_kept_alive(&link->command)) {
+        leap(link, theirs);
+    } else if (lead < LEAD_LEAST || lead >= SEQUENCE_HALF) {
+        link->sequence = (uint8_t)(theirs + SEQUENCE_OVER);
     }
 }
 

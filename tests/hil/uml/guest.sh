@@ -53,7 +53,7 @@ bend_start() {
             sequence=$(((sequence + 1) % 256))
             printf -v frame '05%d#%02X01%s00000000' "$node" "$sequence" "$1"
             cansend vcan0 "$frame"
-            read -rt 0.02 -u 9 || true
+            read -rt "${BEND_PAUSE:-0.02}" -u 9 || true
         done
     ) &
     bending=$!

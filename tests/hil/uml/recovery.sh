@@ -2,8 +2,9 @@
 # module vents on the command timeout meanwhile; all of it is counted. The board's own words are the oracle.
 # ALL_ORDERS=1: all six orders of killing and starting the three, in place of three.
 . tests/hil/uml/guest.sh
+shown="$SCRATCH/bend.out $SCRATCH/clear.out"
 mission=$TRIBEND_BUILD/tests/hil/uml/mission
-BOARD_NICE=10
+touch "$SCRATCH/bend.out" "$SCRATCH/clear.out"
 boards=0 bridges=0 monitors=0
 # state BOARD-NAME: what its firmware last said
 board_state() { sed -n 's/.*state: //p' "$SCRATCH/board_$boards.out" 2>/dev/null | tail -n 1; }
