@@ -31,6 +31,7 @@ say(const struct board_changes *changes, const struct board *board, const char *
     vfprintf(changes->out, format, arguments);
     va_end(arguments);
     fputc('\n', changes->out);
+    (void)fflush(changes->out); /* also into a file or a pipe: somebody waits for it */
 }
 
 /* Notes a flag; true where it changed. */

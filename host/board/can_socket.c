@@ -76,37 +76,69 @@ void can_socket_close(struct can_socket *can) {
     }
 }
 
+/* To all who listen at the Unix socket but the one who said it; false: nobody took it. */
+static bool give_peers(struct can_socket *can, const struct hal_can_frame *frame, const char *sender) {
+    struct sockaddr_un peer = {.sun_family = AF_UNIX};
+    bool given = false;
+    for (size_t p = 0; p < can->peers; p++) {
+        if (strcmp(can->peer_path[p], sender) == 0) {
+            continue;
+        }
+        (void)snprintf(peer.sun_path, sizeof peer.sun_path, "%s", can->peer_path[p]);
+        const enum transport_result result = socketcan_send(can->descriptor, frame, &peer);
+        given = given || result == TRANSPORT_DONE;
+        can->not_sent += result == TRANSPORT_NOTHING ? 1 : 0;
+        if (result == TRANSPORT_GONE) { /* it went without a word */
+            memcpy(can->peer_path[p--], can->peer_path[--can->peers], sizeof can->peer_path[0]);
+        }
+    }
+    return given;
+}
+
+static void remember(struct can_socket *can, const char *sender) {
+    size_t p = 0;
+    while (p < can->peers && strcmp(can->peer_path[p], sender) != 0) {
+        p++;
+    }
+    if (p == can->peers) {
+        p = can->peers < CAN_SOCKET_PEERS ? can->peers++ : CAN_SOCKET_PEERS - 1;
+        (void)snprintf(can->peer_path[p], sizeof can->peer_path[p], "%s", sender);
+    }
+}
+
+static void take_one(struct can_socket *can, struct board *board, const struct hal_can_frame *frame,
+                     const char *sender) {
+    can->taken += board_send(board, frame) ? 1 : 0;
+    if (*sender != '\0') {
+        remember(can, sender);
+        (void)give_peers(can, frame, sender);
+    }
+}
+
 static bool take(struct can_socket *can, struct board *board) {
     struct canfd_frame frame;
     struct transport_frame taken;
-    struct sockaddr_un sender = {.sun_family = AF_UNSPEC};
-    socklen_t sender_bytes = sizeof sender;
+    struct sockaddr_un sender;
     for (;;) {
+        memset(&sender, 0, sizeof sender);
+        socklen_t sender_bytes = sizeof sender;
         const ssize_t size =
             recvfrom(can->descriptor, &frame, sizeof frame, 0, (struct sockaddr *)&sender, &sender_bytes);
         if (size < 0) {
             return errno == EAGAIN || errno == EINTR || errno == ENETDOWN;
         }
-        if (can->own_path[0] != '\0' && sender.sun_family == AF_UNIX &&
-            sender_bytes > sizeof sender.sun_family) {
-            (void)snprintf(can->peer_path, sizeof can->peer_path, "%s", sender.sun_path);
-        }
+        const bool is_unix = can->own_path[0] != '\0' && sender.sun_family == AF_UNIX;
         if (!socketcan_to_frame(&frame, (size_t)size, &taken) || taken.is_error) {
             can->ignored++;
-        } else if (board_send(board, &taken.frame)) {
-            can->taken++;
+        } else {
+            take_one(can, board, &taken.frame, is_unix ? sender.sun_path : "");
         }
-        sender_bytes = sizeof sender;
     }
 }
 
 static bool give_one(struct can_socket *can, const struct hal_can_frame *frame) {
-    struct sockaddr_un peer = {.sun_family = AF_UNIX};
-    if (can->own_path[0] == '\0') {
-        return socketcan_send(can->descriptor, frame, NULL) == TRANSPORT_DONE;
-    }
-    (void)snprintf(peer.sun_path, sizeof peer.sun_path, "%s", can->peer_path);
-    return can->peer_path[0] != '\0' && socketcan_send(can->descriptor, frame, &peer) == TRANSPORT_DONE;
+    return can->own_path[0] != '\0' ? give_peers(can, frame, "")
+                                    : socketcan_send(can->descriptor, frame, NULL) == TRANSPORT_DONE;
 }
 
 bool can_socket_exchange(struct can_socket *can, struct board *board) {

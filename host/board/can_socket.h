@@ -1,6 +1,6 @@
 /* The emulated board's CAN bus to the world: SocketCAN (can0, vcan0), or a Unix datagram socket of struct
  * canfd_frame for machines without it. Frames of the world join the virtual bus as another node's; what the
- * board sends goes out. */
+ * board sends goes out. On a Unix socket whoever spoke hears the board, and the others who spoke, until it goes. */
 #ifndef TRIBEND_CAN_SOCKET_H
 #define TRIBEND_CAN_SOCKET_H
 
@@ -9,12 +9,14 @@
 #include "emulator/board.h"
 
 #define CAN_SOCKET_PATH_BYTES 108
+#define CAN_SOCKET_PEERS 8
 
 struct can_socket {
     int descriptor;
     char
         own_path[CAN_SOCKET_PATH_BYTES]; /* of a Unix socket that is ours to remove; "" where there is none */
-    char peer_path[CAN_SOCKET_PATH_BYTES]; /* where its frames go: the last sender */
+    char peer_path[CAN_SOCKET_PEERS][CAN_SOCKET_PATH_BYTES]; /* a ninth takes the place of the last */
+    size_t peers;
     uint64_t taken, given;
     uint64_t not_sent; /* the socket had no room, or nobody listened */
     uint64_t ignored;  /* error frames, and what is no frame at all */

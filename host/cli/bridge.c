@@ -2,6 +2,7 @@
  */
 #include <errno.h>
 #include <inttypes.h>
+#include <jansson.h>
 #include <poll.h>
 #include <stdio.h>
 #include <string.h>
@@ -17,7 +18,7 @@
 #define CHANNEL_BYTES 64
 #define PREFIX_MOST (CHANNEL_BYTES - 24)
 #define WAKE_MS 20
-#define FRAMES_A_TURN 512 /* then LCM has its turn */
+#define FRAMES_A_TURN 64 /* then LCM has its turn */
 #define MESSAGES_A_TURN 64
 #define REOPEN_LEAST_US 100000
 #define REOPEN_MOST_US 2000000
@@ -28,7 +29,7 @@ struct settings {
     struct bridge_logs_paths logs;
     int node;
     double duration_s; /* 0: until Ctrl-C */
-    bool quiet;
+    bool quiet, json;
 };
 
 static const struct argp_option options[] = {
@@ -43,6 +44,7 @@ static const struct argp_option options[] = {
     {"record", 'r', "FILE", 0, "write a run log (CSV); FILE.part until the end", 2},
     {"table", 't', "FILE", 0, "the board's bend table, named in the run log", 2},
     {"quiet", 'q', NULL, 0, "only the summary", 2},
+    {"json", 'j', NULL, 0, "for programs: only the summary, as one JSON object", 2},
     {0}};
 
 static void parse_duration(struct argp_state *state, const char *text, struct settings *settings) {
@@ -89,6 +91,9 @@ static error_t parse(int key, char *argument, struct argp_state *state) {
     case 't':
         settings->table = argument;
         return 0;
+    case 'j':
+        settings->json = settings->quiet = true;
+        return 0;
     case 'q':
         settings->quiet = true;
         return 0;
@@ -124,6 +129,8 @@ struct session {
     struct bridge_logs logs;
     struct transport bus;
     bool connected;
+    bool more;        /* frames are waiting that poll does not see */
+    int64_t frame_us; /* when the frame under way came; 0: none is */
     int64_t reopen_us, pause_us;
     uint64_t overflowed, malformed; /* of buses that were closed */
     lcm_t *lcm;
@@ -150,9 +157,13 @@ static bool publish(void *context, enum bridge_channel channel, const void *data
     struct session *session = context;
     char name[CHANNEL_BYTES];
     channel_name(session, channel, name);
-    session->bridge.counters.log_errors +=
-        bridge_logs_message(&session->logs, name, data, bytes, clock_us(CLOCK_REALTIME));
-    return lcm_publish(session->lcm, name, data, bytes) == 0;
+    const bool published = lcm_publish(session->lcm, name, data, bytes) == 0;
+    const int64_t host_us = clock_us(CLOCK_REALTIME);
+    if (published && session->frame_us > 0) {
+        latency_add(&session->bridge.latency, host_us - session->frame_us);
+    }
+    session->bridge.counters.log_errors += bridge_logs_message(&session->logs, name, data, bytes, host_us);
+    return published;
 }
 
 static bool send_frame(void *context, const struct hal_can_frame *frame) {
@@ -190,6 +201,15 @@ static bool subscribe(struct session *session) {
 
 /* --- the loop --- */
 
+/* A CAN log has every frame; else those of other nodes need not come here at all. */
+static bool open_bus(struct session *session, char *error, size_t error_bytes) {
+    session->connected = transport_open(&session->bus, session->settings->bus, error, error_bytes);
+    if (session->connected && session->settings->logs.can == NULL && session->bus.listen_to != NULL) {
+        session->bus.listen_to(&session->bus, (uint32_t)session->settings->node);
+    }
+    return session->connected;
+}
+
 static void note_transport(struct session *session) {
     session->bridge.counters.frames_overflowed = session->overflowed + session->bus.overflowed;
     session->bridge.counters.frames_malformed = session->malformed + session->bus.malformed;
@@ -215,9 +235,11 @@ static void reopen(struct session *session, const struct bridge_now *now) {
     if (session->connected || now->monotonic_us < session->reopen_us) {
         return;
     }
-    session->connected = transport_open(&session->bus, session->settings->bus, error, sizeof error);
-    if (session->connected) {
+    if (open_bus(session, error, sizeof error)) {
         session->bridge.counters.bus_reopened++;
+        if (!session->settings->quiet) {
+            printf("bus        %s is back\n", session->settings->bus);
+        }
     } else {
         session->pause_us = 2 * session->pause_us < REOPEN_MOST_US ? 2 * session->pause_us : REOPEN_MOST_US;
         session->reopen_us = now->monotonic_us + session->pause_us;
@@ -233,24 +255,34 @@ static void log_report(struct session *session) {
     }
 }
 
-static void take_frames(struct session *session) {
-    struct transport_frame frame;
-    for (int i = 0; session->connected && i < FRAMES_A_TURN; i++) {
-        const enum transport_result result = session->bus.receive(&session->bus, &frame);
-        const struct bridge_now now = present();
-        if (result == TRANSPORT_GONE) {
-            lose_bus(session, &now);
-        }
-        if (result != TRANSPORT_DONE) {
-            return;
-        }
-        bridge_take_frame(&session->bridge, &frame, &now);
-        if (!frame.is_error) {
-            session->bridge.counters.log_errors +=
-                bridge_logs_frame(&session->logs, &frame.frame, frame.time_us);
-        }
-        log_report(session);
+static void take_frame(struct session *session, const struct transport_frame *frame,
+                       const struct bridge_now *now) {
+    session->frame_us = frame->time_us;
+    bridge_take_frame(&session->bridge, frame, now);
+    session->frame_us = 0;
+    if (!frame->is_error) {
+        session->bridge.counters.log_errors +=
+            bridge_logs_frame(&session->logs, &frame->frame, frame->time_us);
     }
+    log_report(session);
+}
+
+/* True: there are more. The clock is read once for all that is read in one go, and again for each that is
+ * published. */
+static bool take_frames(struct session *session) {
+    const struct bridge_now now = present();
+    struct transport_frame frame;
+    enum transport_result result = session->connected ? TRANSPORT_DONE : TRANSPORT_NOTHING;
+    for (int i = 0; result == TRANSPORT_DONE && i < FRAMES_A_TURN; i++) {
+        result = session->bus.receive(&session->bus, &frame);
+        if (result == TRANSPORT_DONE) {
+            take_frame(session, &frame, &now);
+        }
+    }
+    if (result == TRANSPORT_GONE) {
+        lose_bus(session, &now);
+    }
+    return result == TRANSPORT_DONE;
 }
 
 static void take_messages(struct session *session) {
@@ -285,10 +317,8 @@ static void say_changes(struct session *session) {
 static void turn(struct session *session) {
     struct pollfd wait[2] = {{.fd = lcm_get_fileno(session->lcm), .events = POLLIN},
                              {.fd = session->connected ? session->bus.descriptor : -1, .events = POLLIN}};
-    (void)poll(wait, 2, WAKE_MS);
-    if (wait[1].revents != 0) {
-        take_frames(session);
-    }
+    (void)poll(wait, 2, session->more ? 0 : WAKE_MS);
+    session->more = (session->more || wait[1].revents != 0) && take_frames(session);
     if (wait[0].revents != 0) {
         take_messages(session);
     }
@@ -305,9 +335,27 @@ static void summarise(const struct session *session) {
 #define BRIDGE_COUNTER(name, text) printf("%-20s %10" PRIu64 "  " text "\n", #name, bridge->counters.name);
     BRIDGE_COUNTERS(BRIDGE_COUNTER)
 #undef BRIDGE_COUNTER
-    printf("latency    median %" PRId64 " us, p99 %" PRId64 " us from the kernel's time stamp to LCM\n",
+    printf("latency    median %" PRId64 " us, p99 %" PRId64
+           " us from the kernel's time stamp until LCM has it\n",
            latency_of(&bridge->latency, 0.5), latency_of(&bridge->latency, 0.99));
     printf("clock      %zu windows, drift %.1f ppm\n", bridge->clock.windows, 1e6 * bridge->clock.drift);
+}
+
+static int print_json(const struct bridge *bridge) {
+    json_t *object = json_object(), *counters = json_object();
+#define BRIDGE_COUNTER(name, text)                                                                           \
+    (void)json_object_set_new(counters, #name, json_integer((json_int_t)bridge->counters.name));
+    BRIDGE_COUNTERS(BRIDGE_COUNTER)
+#undef BRIDGE_COUNTER
+    (void)json_object_set_new(object, "counters", counters);
+    (void)json_object_set_new(object, "latency_median_us", json_integer(latency_of(&bridge->latency, 0.5)));
+    (void)json_object_set_new(object, "latency_p99_us", json_integer(latency_of(&bridge->latency, 0.99)));
+    (void)json_object_set_new(object, "clock_windows", json_integer((json_int_t)bridge->clock.windows));
+    (void)json_object_set_new(object, "clock_drift_ppm", json_real(1e6 * bridge->clock.drift));
+    const int failed = json_dumpf(object, stdout, JSON_INDENT(2) | JSON_REAL_PRECISION(9));
+    json_decref(object);
+    printf("\n");
+    return failed == 0 ? EXIT_OK : program_fail(EXIT_OUTPUT, "cannot write to standard output");
 }
 
 static int run(struct session *session) {
@@ -322,9 +370,13 @@ static int run(struct session *session) {
     const struct bridge_now now = present();
     bridge_vent(&session->bridge, &now);
     const bool whole = bridge_logs_close(&session->logs, error, sizeof error);
-    summarise(session);
     if (!whole) {
         return program_fail(EXIT_OUTPUT, "%s", error);
+    }
+    if (!session->settings->json) {
+        summarise(session);
+    } else if (print_json(&session->bridge) != EXIT_OK) {
+        return EXIT_OUTPUT;
     }
     return session->settings->duration_s > 0.0 && program_interrupted != 0 ? EXIT_INTERRUPTED : EXIT_OK;
 }
@@ -355,7 +407,7 @@ static int open_logs(struct session *session) {
 static int open_lcm(struct session *session) {
     session->lcm = lcm_create(session->settings->url);
     if (session->lcm == NULL || !subscribe(session)) {
-        return program_fail(EXIT_SOLVER,
+        return program_fail(EXIT_BUS,
                             "LCM at %s: cannot be opened. An URL looks like " URL_DEFAULT
                             "; multicast needs a route (as root: ip route add 224.0.0.0/4 dev lo)",
                             session->settings->url != NULL ? session->settings->url : "its default URL");
@@ -368,9 +420,8 @@ static int use(struct session *session) {
     const struct bridge_now now = present();
     char error[PROGRAM_ERROR_BYTES];
     bridge_init(&session->bridge, (uint32_t)session->settings->node, &out, &now);
-    session->connected = transport_open(&session->bus, session->settings->bus, error, sizeof error);
-    if (!session->connected) {
-        return program_fail(EXIT_SOLVER, "%s", error);
+    if (!open_bus(session, error, sizeof error)) {
+        return program_fail(EXIT_BUS, "%s", error);
     }
     int code = open_logs(session);
     code = code == EXIT_OK ? open_lcm(session) : code;

@@ -32,6 +32,9 @@ static error_t parse(int key, char *text, struct argp_state *state) {
     case 'p':
         arguments->page = true;
         return 0;
+    case ARGP_KEY_ARG:
+        argp_error(state, "dbc takes no argument, '%s' is too much", text);
+        return 0;
     default:
         return ARGP_ERR_UNKNOWN;
     }

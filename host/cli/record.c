@@ -5,28 +5,39 @@
 #include <time.h>
 
 #include "cli/commands.h"
+#include "cli/report_json.h"
 #include "log/run_log.h"
 
 #define WORDS_BYTES 512
 #define LOOK_US 100000 /* for Ctrl-C, while nothing comes */
 
+struct arguments {
+    struct bus_options bus;
+    bool json;
+};
+
 static const struct argp_option options[] = {
-    {"output", 'o', "RUN.csv", 0, "the run log to write (required)", 0}, {0}};
+    {"output", 'o', "RUN.csv", 0, "the run log to write (required)", 0},
+    {"json", 'j', NULL, 0, "for programs: the summary as one JSON object", 0},
+    {0}};
 
 static error_t parse(int key, char *argument, struct argp_state *state) {
-    struct bus_options *bus = state->input;
+    struct arguments *arguments = state->input;
     switch (key) {
     case ARGP_KEY_INIT:
-        state->child_inputs[0] = bus;
+        state->child_inputs[0] = &arguments->bus;
         return 0;
     case 'o':
-        bus->record = argument;
+        arguments->bus.record = argument;
+        return 0;
+    case 'j':
+        arguments->json = true;
         return 0;
     case ARGP_KEY_ARG:
         argp_error(state, "record takes no argument, '%s' is too much", argument);
         return 0;
     case ARGP_KEY_END:
-        if (bus->record == NULL) {
+        if (arguments->bus.record == NULL) {
             argp_error(state, "where to? For example: -o run.csv --for 10s");
         }
         return 0;
@@ -102,8 +113,20 @@ static void print_summary(struct bus *bus, const struct bus_options *bus_options
     printf("wrote     %s\n", bus_options->record);
 }
 
+static int print_json(struct bus *bus, const struct bus_options *bus_options,
+                      const struct link_report *report, uint64_t rows) {
+    json_t *object = report_json(bus, report);
+    (void)json_object_set_new(object, "rows", json_integer((json_int_t)rows));
+    (void)json_object_set_new(object, "wrote", json_string(bus_options->record));
+    const int failed = json_dumpf(object, stdout, JSON_INDENT(2) | JSON_REAL_PRECISION(9));
+    json_decref(object);
+    printf("\n");
+    return failed == 0 ? EXIT_OK : program_fail(EXIT_OUTPUT, "cannot write to standard output");
+}
+
 static int record(struct bus *bus, void *input) {
-    const struct bus_options *bus_options = input;
+    const struct arguments *arguments = input;
+    const struct bus_options *bus_options = &arguments->bus;
     char error[PROGRAM_ERROR_BYTES], note[64];
     struct run_log_writer log;
     struct link_report report;
@@ -116,20 +139,24 @@ static int record(struct bus *bus, void *input) {
         return program_fail(EXIT_OUTPUT, "%s", error);
     }
     program_catch_interrupt();
-    const int code = follow(bus, bus_options, &log, &rows, &report);
+    int code = follow(bus, bus_options, &log, &rows, &report);
     if (!run_log_finish(&log, error, sizeof error)) { /* what came before the link went is worth keeping */
         return program_fail(EXIT_OUTPUT, "%s", error);
     }
-    print_summary(bus, bus_options, &report, rows);
+    if (!arguments->json) {
+        print_summary(bus, bus_options, &report, rows);
+    } else if (code == EXIT_OK || code == EXIT_INTERRUPTED) {
+        code = print_json(bus, bus_options, &report, rows) == EXIT_OK ? code : EXIT_OUTPUT;
+    }
     return code == EXIT_OK && report.status.faults != 0u ? EXIT_FAULT : code;
 }
 
 int cli_record(int argc, char **argv) {
-    struct bus_options bus_options;
-    bus_options_init(&bus_options);
+    struct arguments arguments = {.json = false};
+    bus_options_init(&arguments.bus);
     argp_err_exit_status = EXIT_USAGE;
-    if (argp_parse(&parser, argc, argv, 0, NULL, &bus_options) != 0) {
+    if (argp_parse(&parser, argc, argv, 0, NULL, &arguments) != 0) {
         return EXIT_USAGE;
     }
-    return bus_run(&bus_options, record, &bus_options);
+    return bus_run(&arguments.bus, record, &arguments);
 }

@@ -82,6 +82,7 @@ static void set_board(json_t *object, struct bus *bus) {
         (void)json_object_set_new(object, "node", json_integer(bus->can->node));
         (void)json_object_set_new(object, "protocol", json_integer(bus->identity.protocol));
         (void)json_object_set_new(object, "firmware", json_integer(bus->identity.firmware));
+        (void)json_object_set_new(object, "silence_s", json_real(1e-6 * (double)can_link_silence_us(bus->can)));
         (void)json_object_set_new(object, "counters", counters_json(bus->can));
     }
 }

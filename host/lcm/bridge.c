@@ -180,7 +180,6 @@ void bridge_take_frame(struct bridge *bridge, const struct transport_frame *fram
     if (trouble.out_of_range == 0) {
         take_message(bridge, id, &message, frame, now);
     }
-    latency_add(&bridge->latency, now->host_us - frame->time_us);
 }
 
 /* --- commands --- */

@@ -35,7 +35,15 @@
 #define SEQUENCE_FLIPS 2u
 #define SEQUENCE_HALF 128u
 #define REFUSED_STEPS 150 /* a refusal within so many control steps of the last TIME is a new one */
-#define SEQUENCE_OVER 64u /* beyond another host's: it is refused from then on, we are not */
+/* Ahead of another host's sequence by so much it is refused from then on, and we are not. Half a turn ahead
+ * would look like behind: before that the lead is taken anew, in leaps that the board still takes for steps
+ * forward. */
+#define SEQUENCE_OVER 64u
+#define LEAD_LEAST 16u
+#define LEAD_MOST 96u
+#define LEAP 80u
+#define LEAPS 2u
+#define OTHER_HOST_US 1000000
 #define PROTOCOL_MASK 15u
 
 static int64_t now_us(void) {
@@ -190,6 +198,10 @@ static void take_identity(struct can_link *link, enum message_id id, const union
         take_name(link, &message->identity_name);
     }
     identity->known = link->name_pieces == ALL_OF_IDENTITY;
+    if (identity->known && link->transport.listen_to != NULL) {
+        link->transport.listen_to(&link->transport,
+                                  link->node); /* who else is there was of interest till now */
+    }
 }
 
 /* What came back may be another firmware. */
@@ -204,7 +216,8 @@ static void forget_identity(struct can_link *link) {
 static void take_refusal(struct can_link *link, const struct message_refusals *refusal) {
     const int16_t ahead = (int16_t)(uint16_t)(refusal->step - link->assembly.step);
     if (refusal->count > 0 && refusal->reason == NODE_REFUSED_STALE && ahead > -REFUSED_STEPS &&
-        ahead < REFUSED_STEPS && link->commanded_us > 0 && link->sequence_flips < SEQUENCE_FLIPS) {
+        ahead < REFUSED_STEPS && link->commanded_us > 0 && link->sequence_flips < SEQUENCE_FLIPS &&
+        now_us() - link->other_host_us > OTHER_HOST_US) { /* else the stale one is that host */
         link->sequence_flips++;
         link->sequence = (uint8_t)(link->sequence + SEQUENCE_HALF);
         link->repeat_us = 0;
@@ -239,11 +252,29 @@ static void take_message(struct can_link *link, enum message_id id, const union 
     }
 }
 
-/* Another host's command to our board: our next sequence goes over it. */
+static void leap(struct can_link *link, uint8_t theirs) {
+    const union message nothing = {0};
+    for (uint32_t l = 0; l < LEAPS; l++) {
+        link->sequence = (uint8_t)(link->sequence + LEAP);
+        (void)send_message(link, MESSAGE_HOST_HEARTBEAT, &nothing);
+    }
+    link->sequence = (uint8_t)(theirs + SEQUENCE_OVER);
+}
+
+/* Another host's command to our board: our next sequence stays over it. What we said before is never gone
+ * behind, or the board would take us for the stale one. */
 static void take_other_host(struct can_link *link, enum message_id id, const struct hal_can_frame *frame) {
+    const uint8_t theirs = frame->data[0];
+    const uint8_t lead = (uint8_t)(link->sequence - theirs);
     link->counters.other_hosts++;
-    if (message_row(id)->number < message_row(MESSAGE_STATUS)->number) {
-        link->sequence = (uint8_t)(frame->data[0] + SEQUENCE_OVER);
+    if (message_row(id)->number >= message_row(MESSAGE_STATUS)->number) {
+        return;
+    }
+    link->other_host_us = now_us();
+    if (lead > LEAD_MOST && lead < SEQUENCE_HALF && is_kept_alive(&link->command)) {
+        leap(link, theirs);
+    } else if (lead < LEAD_LEAST || lead >= SEQUENCE_HALF) {
+        link->sequence = (uint8_t)(theirs + SEQUENCE_OVER);
     }
 }
 
@@ -279,7 +310,8 @@ static void take_error(struct can_link *link, uint32_t error_class) {
     link->counters.bus_off += (error_class & CAN_ERR_BUSOFF) != 0 ? 1u : 0u;
 }
 
-static void read_frames(struct can_link *link) {
+/* True: there are more. */
+static bool read_frames(struct can_link *link) {
     struct transport_frame frame;
     enum transport_result result = TRANSPORT_DONE;
     for (int i = 0; i < FRAMES_A_TURN && result == TRANSPORT_DONE; i++) {
@@ -292,9 +324,7 @@ static void read_frames(struct can_link *link) {
     }
     link->counters.overflowed = link->transport.overflowed;
     link->counters.malformed = link->transport.malformed;
-    if (result == TRANSPORT_GONE) {
-        (void)lose_bus(link);
-    }
+    return result == TRANSPORT_GONE ? lose_bus(link) : result == TRANSPORT_DONE;
 }
 
 /* --- the thread */
@@ -325,13 +355,15 @@ static void notice_silence(struct can_link *link, int64_t time_us) {
     }
 }
 
-static void turn(struct can_link *link) {
+/* True: frames are waiting already. */
+static bool turn(struct can_link *link) {
     const int64_t time_us = now_us();
+    bool more = false;
     if (!link->connected) {
         reopen(link, time_us);
     }
     if (link->connected) {
-        read_frames(link);
+        more = read_frames(link);
     }
     notice_silence(link, time_us);
     if (link->connected) {
@@ -341,6 +373,7 @@ static void turn(struct can_link *link) {
         ask(link, time_us);
     }
     (void)pthread_cond_broadcast(&link->changed);
+    return more;
 }
 
 static void *run(void *context) {
@@ -352,9 +385,7 @@ static void *run(void *context) {
     for (;;) {
         (void)pthread_mutex_lock(&link->lock);
         const bool stop = link->stop;
-        if (!stop) {
-            turn(link);
-        }
+        const bool more = !stop && turn(link);
         struct pollfd wait[3] = {{.fd = link->timer, .events = POLLIN},
                                  {.fd = link->wake, .events = POLLIN},
                                  {.fd = link->connected ? link->transport.descriptor : -1, .events = POLLIN}};
@@ -362,7 +393,7 @@ static void *run(void *context) {
         if (stop) {
             return NULL;
         }
-        (void)poll(wait, 3, -1);
+        (void)poll(wait, 3, more ? 0 : -1);
         for (int i = 0; i < 2; i++) { /* both are only there to wake */
             if ((wait[i].revents & POLLIN) != 0 && read(wait[i].fd, &count, sizeof count) < 0 &&
                 errno != EAGAIN) {

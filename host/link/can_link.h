@@ -98,6 +98,7 @@ struct can_link {
     int64_t heartbeat_us; /* when the next one is due */
     int64_t heartbeat_period_us;
     int64_t identify_us; /* when the board is asked next who it is */
+    int64_t other_host_us; /* when another host last commanded our board; 0: none did */
     uint8_t sequence;
     uint32_t sequence_flips;
     /* the thread's */

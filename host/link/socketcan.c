@@ -8,11 +8,11 @@
 #include <string.h>
 #include <sys/ioctl.h>
 #include <sys/socket.h>
-#include <time.h>
 #include <unistd.h>
 
+#include "comms/codec.h"
+
 #define RECEIVE_BUFFER_BYTES (4 << 20) /* some seconds of a full bus */
-#define CONTROL_BYTES 256
 
 bool socketcan_to_frame(const struct canfd_frame *can, size_t size, struct transport_frame *frame) {
     const bool fd = size == CANFD_MTU;
@@ -37,49 +37,18 @@ size_t socketcan_from_frame(const struct hal_can_frame *frame, struct canfd_fram
     return frame->fd ? CANFD_MTU : CAN_MTU;
 }
 
-/* Reception time and the kernel's count of what it dropped. */
-static void read_control(struct transport *transport, struct msghdr *message, struct transport_frame *frame) {
-    for (struct cmsghdr *control = CMSG_FIRSTHDR(message); control != NULL;
-         control = CMSG_NXTHDR(message, control)) {
-        if (control->cmsg_level != SOL_SOCKET) {
-            continue;
-        }
-        if (control->cmsg_type == SCM_TIMESTAMPNS) {
-            struct timespec time;
-            memcpy(&time, CMSG_DATA(control), sizeof time);
-            frame->time_us = (int64_t)time.tv_sec * 1000000 + time.tv_nsec / 1000;
-        } else if (control->cmsg_type == SO_RXQ_OVFL) {
-            uint32_t dropped = 0;
-            memcpy(&dropped, CMSG_DATA(control), sizeof dropped);
-            transport->overflowed += dropped - transport->overflow_seen;
-            transport->overflow_seen = dropped;
-        }
-    }
-}
-
 static enum transport_result receive(struct transport *transport, struct transport_frame *frame) {
-    struct canfd_frame can;
-    union {
-        char bytes[CONTROL_BYTES];
-        struct cmsghdr align;
-    } control;
     for (;;) {
-        struct iovec part = {.iov_base = &can, .iov_len = sizeof can};
-        struct msghdr message = {.msg_iov = &part,
-                                 .msg_iovlen = 1,
-                                 .msg_control = control.bytes,
-                                 .msg_controllen = sizeof control.bytes};
-        const ssize_t size = recvmsg(transport->descriptor, &message, 0);
-        if (size < 0 && errno == EINTR) {
-            continue;
-        }
-        if (size < 0) {
+        const struct can_batch_frame *read = can_batch_next(&transport->batch, transport->descriptor);
+        if (read == NULL) {
             return errno == EAGAIN ? TRANSPORT_NOTHING : TRANSPORT_GONE;
         }
-        const bool ours = socketcan_to_frame(&can, (size_t)size, frame);
-        frame->time_us = transport_now_us();
-        read_control(transport, &message, frame);
-        if (ours) {
+        if (read->has_dropped) {
+            transport->overflowed += read->dropped - transport->overflow_seen;
+            transport->overflow_seen = read->dropped;
+        }
+        if (socketcan_to_frame(&read->can, read->bytes, frame)) {
+            frame->time_us = read->time_us;
             return TRANSPORT_DONE;
         }
         transport->malformed++;
@@ -104,6 +73,13 @@ enum transport_result socketcan_send(int descriptor, const struct hal_can_frame 
 
 static enum transport_result send_frame(struct transport *transport, const struct hal_can_frame *frame) {
     return socketcan_send(transport->descriptor, frame, NULL);
+}
+
+/* Of and to one node, by standard identifiers; all that a bus of many nodes carries costs nothing then. */
+static void listen_to(struct transport *transport, uint32_t node) {
+    const struct can_filter filter = {.can_id = node,
+                                      .can_mask = MESSAGE_NODE_MOST | CAN_EFF_FLAG | CAN_RTR_FLAG};
+    (void)setsockopt(transport->descriptor, SOL_CAN_RAW, CAN_RAW_FILTER, &filter, sizeof filter);
 }
 
 static void close_socket(struct transport *transport) {
@@ -147,6 +123,7 @@ bool socketcan_open(struct transport *transport, const char *interface, char *er
     }
     transport->receive = receive;
     transport->send = send_frame;
+    transport->listen_to = listen_to;
     transport->close = close_socket;
     memset(&request, 0, sizeof request);
     (void)snprintf(request.ifr_name, sizeof request.ifr_name, "%s", interface);

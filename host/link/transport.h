@@ -4,14 +4,16 @@
  *     slcan:/dev/ttyACM0[@500000] an adapter that speaks the ASCII protocol of Lawicel's CAN232 (SLCAN)
  *     unix:PATH                   the emulated board's datagram socket
  *
- * Nothing here blocks: poll `descriptor`, then receive until there is nothing. Not here: what frames mean
- * (can_link.h), when to open again (can_link.h). */
+ * Nothing here blocks: poll `descriptor`, then receive until there is nothing; who stops before does not
+ * poll, for what was read already may wait in here. Not here: what frames mean (can_link.h), when to open
+ * again (can_link.h). */
 #ifndef TRIBEND_TRANSPORT_H
 #define TRIBEND_TRANSPORT_H
 
 #include <stddef.h>
 
 #include "hal.h"
+#include "link/can_batch.h"
 #include "link/slcan.h"
 
 #define TRANSPORT_PATH_BYTES 108
@@ -37,8 +39,11 @@ struct transport {
     uint64_t malformed;  /* what was no frame of ours: remote frames, half lines, wrong sizes */
     enum transport_result (*receive)(struct transport *transport, struct transport_frame *frame);
     enum transport_result (*send)(struct transport *transport, const struct hal_can_frame *frame);
+    /* From now on only frames of and to this node, and error frames; NULL: it cannot choose. */
+    void (*listen_to)(struct transport *transport, uint32_t node);
     void (*close)(struct transport *transport);
     /* what one of them keeps */
+    struct can_batch batch;
     uint32_t overflow_seen;
     char own_path[TRANSPORT_PATH_BYTES];
     char peer_path[TRANSPORT_PATH_BYTES];

@@ -10,17 +10,13 @@
 #include "link/socketcan.h"
 
 static enum transport_result receive(struct transport *transport, struct transport_frame *frame) {
-    struct canfd_frame can;
     for (;;) {
-        const ssize_t size = recv(transport->descriptor, &can, sizeof can, 0);
-        if (size < 0 && errno == EINTR) {
-            continue;
-        }
-        if (size < 0) {
+        const struct can_batch_frame *read = can_batch_next(&transport->batch, transport->descriptor);
+        if (read == NULL) {
             return errno == EAGAIN ? TRANSPORT_NOTHING : TRANSPORT_GONE;
         }
-        if (socketcan_to_frame(&can, (size_t)size, frame)) {
-            frame->time_us = transport_now_us();
+        if (socketcan_to_frame(&read->can, read->bytes, frame)) {
+            frame->time_us = read->time_us;
             return TRANSPORT_DONE;
         }
         transport->malformed++;
@@ -78,8 +74,11 @@ bool unix_bus_open(struct transport *transport, const char *path, char *error, s
     transport->send = send_frame;
     transport->close = close_socket;
     if (connect(transport->descriptor, (const struct sockaddr *)&peer, sizeof peer) != 0) {
-        return refuse(path, "no board listens there (start one: tribend board --bus unix:PATH)", error,
-                      error_bytes);
+        return refuse(path,
+                      errno == EACCES
+                          ? "no permission (it is another user's board, or folder: ask for write permission)"
+                          : "no board listens there (start one: tribend board --bus unix:PATH)",
+                      error, error_bytes);
     }
     /* connected, the socket would refuse what others than the peer send, a board that was started anew among
      * them */

@@ -1,4 +1,5 @@
-"""Decodes random frames by the DBC with canmatrix, a parser that is not ours, and compares with `tribend decode --json`.
+"""Decodes random frames by the DBC with canmatrix, a parser that is not ours, and compares with `tribend decode --json`; packs
+what it decoded again, which must be the same message.
 
 Usage: dbc_independent.py DBC TRIBEND COUNT; prints what differs, exit 0 when nothing does."""
 import json
@@ -51,7 +52,11 @@ def main(dbc, tribend, count):
             print(frame.name, "has fields", sorted(fields), "and signals", sorted(decoded))
             wrong += 1
             continue
+        again = frame.decode(frame.encode({name: signal.signal.phys2raw(signal.phys_value) for name, signal in decoded.items()}))
         for name, signal in decoded.items():
+            if again[name].raw_value != signal.raw_value:
+                print(frame.name, name, "raw", signal.raw_value, "comes back as", again[name].raw_value)
+                wrong += 1
             theirs, mine = named(signal.signal, signal.raw_value, signal.phys_value), fields[name]
             signals += 1
             if isinstance(mine, str) and mine.startswith("0x"):

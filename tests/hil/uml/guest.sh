@@ -45,7 +45,7 @@ candump_start() {
     dump=$SCRATCH/$1.log
 }
 
-# bend_start RAW: BEND_COMMAND with real cansend, again and again, until bend_stop
+# bend_start RAW: BEND_COMMAND with real cansend, up to fifty times a second, until bend_stop
 bend_start() {
     rm -f "$SCRATCH/bend.stop"
     (
@@ -53,6 +53,7 @@ bend_start() {
             sequence=$(((sequence + 1) % 256))
             printf -v frame '05%d#%02X01%s00000000' "$node" "$sequence" "$1"
             cansend vcan0 "$frame"
+            read -rt "${BEND_PAUSE:-0.02}" -u 9 || true
         done
     ) &
     bending=$!

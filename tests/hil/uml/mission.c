@@ -1,7 +1,9 @@
 /* A commander on LCM, on liblcm and the generated types alone: bends the module in two steps, then vents.
  *
  *     mission arm SECONDS     arms first, as a commander should; each step until the module is there, and as
- * long again mission fly SECONDS     starts without, and goes on with the first step until SECONDS are over
+ *                             long again
+ *     mission fly SECONDS     starts without, and goes on with the first step until SECONDS are over
+ *     mission steady SECONDS  arms, and goes on with the first step until SECONDS are over
  *     mission listen SECONDS  commands nothing; prints the bridge's last status
  *     mission get PARAMETER   asks the board for a parameter and prints the answer
  *
@@ -139,7 +141,7 @@ static int get(lcm_t *lcm, int parameter) {
 int main(int argc, char **argv) {
     lcm_t *lcm = lcm_create(NULL);
     if (lcm == NULL || argc != 3) {
-        fprintf(stderr, "usage: mission arm|fly|listen SECONDS, or mission get PARAMETER\n");
+        fprintf(stderr, "usage: mission arm|fly|steady|listen SECONDS, or mission get PARAMETER\n");
         return 2;
     }
     const double number = strtod(argv[2], NULL);
@@ -148,8 +150,11 @@ int main(int argc, char **argv) {
         code = get(lcm, (int)number);
     } else if (strcmp(argv[1], "listen") == 0) {
         code = listen_to(lcm, (int64_t)(1e6 * number));
+    } else if (strcmp(argv[1], "arm") == 0) {
+        code = fly_steps(lcm, (int64_t)(1e6 * number));
     } else {
-        code = (strcmp(argv[1], "arm") == 0 ? fly_steps : fly)(lcm, (int64_t)(1e6 * number));
+        const bool armed = strcmp(argv[1], "steady") != 0 || command(lcm, ARM, 0);
+        code = armed ? fly(lcm, (int64_t)(1e6 * number)) : 1;
     }
     lcm_destroy(lcm);
     return code;
