@@ -58,10 +58,10 @@ hil: setup ## the flashed ELF on the emulated board: in virtual time, then on re
 	@$(MAKE) --no-print-directory -j$(JOBS) all test-programs firmware-files
 	@tests/tools/run_tests $(BUILD) hil
 
-campaign: setup ## break the simulated board in every way, alone and in pairs (MISSIONS=n SEED=n FAULT=text CSV=file)
-	@$(MAKE) --no-print-directory -j$(JOBS) $(BUILD)/tests/campaign/campaign
+campaign: setup ## break the simulated board in every way, alone and in pairs, and a sample on the emulated one (MISSIONS=n EMULATED=n SEED=n FAULT=text CSV=file)
+	@$(MAKE) --no-print-directory -j$(JOBS) $(BUILD)/tests/campaign/campaign firmware-files
 	@$(BUILD)/tests/campaign/campaign $(if $(MISSIONS),-n $(MISSIONS)) $(if $(SEED),-s $(SEED)) $(if $(FAULT),-f '$(FAULT)') \
-	    -o $(if $(CSV),$(CSV),$(BUILD)/campaign.csv)
+	    -e $(or $(EMULATED),60) -E $(ELF) -o $(if $(CSV),$(CSV),$(BUILD)/campaign.csv)
 
 docs: all ## check the documentation: links, subcommands, headers, drawings, the commands of its pages
 	@tests/tools/setup $(TEST_PACKAGES)

@@ -479,8 +479,14 @@ static void on_flash_read(uc_engine *engine, uc_mem_type type, uint64_t address,
 
 bool core_watch_flash(struct core *core) {
     uc_hook hook;
-    return uc_hook_add(core->engine, &hook, UC_HOOK_MEM_READ, hook_of(on_flash_read), core, CORE_FLASH,
-                       CORE_FLASH + CORE_FLASH_BYTES - 1u) == UC_ERR_OK;
+    if (core->watches_flash) {
+        return true;
+    }
+    core->watches_flash = uc_hook_add(core->engine, &hook, UC_HOOK_MEM_READ, hook_of(on_flash_read), core, CORE_FLASH,
+                                      CORE_FLASH + CORE_FLASH_BYTES - 1u) == UC_ERR_OK;
+    /* code that was translated before would not tell */
+    (void)uc_ctl_remove_cache(core->engine, (uint64_t)CORE_FLASH, (uint64_t)CORE_FLASH + CORE_FLASH_BYTES);
+    return core->watches_flash;
 }
 
 static bool map_memory(struct core *core) {

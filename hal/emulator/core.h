@@ -96,6 +96,7 @@ struct core {
     bool step_seen;
     uint64_t thread_before;
     uint32_t debug[8];
+    bool watches_flash;
     bool held;                /* in reset by the supply: no instruction runs */
     struct core_block *block; /* [CORE_FLASH_BYTES / 2] */
     bool stopped;             /* by a block hook, not by the program */

@@ -26,14 +26,22 @@ static int64_t board_time_us(void *context) {
     return board->time_us;
 }
 
+/* A step that was late leaves the next one too little time for readings of its own: it takes those of the late one. Two without
+ * are a converter that fails. */
 static bool board_read_pressures(void *context, struct hal_pressures *pressures) {
     struct board *board = context;
     uint16_t raw[RAW_CHANNEL_COUNT];
-    if (!pressure_adc_take(raw)) {
+    if (pressure_adc_take(raw)) {
+        conversions_pressures(raw, board->reference_calibration, &board->pressures);
+        board->pressures_old = false;
+    } else {
         board->pressures_missed++;
-        return false;
+        if (board->pressures_old) {
+            return false;
+        }
+        board->pressures_old = true;
     }
-    conversions_pressures(raw, board->reference_calibration, pressures);
+    *pressures = board->pressures;
     return true;
 }
 
@@ -97,7 +105,8 @@ void board_start(struct board *board, uint32_t *clock_hz) {
                                     .read_pressures = board_read_pressures,
                                     .read_tip = board_read_tip,
                                     .write_outputs = board_write_outputs,
-                                    .read_health = board_read_health}};
+                                    .read_health = board_read_health},
+                            .pressures_old = true};
     let_debugger_halt();
     watchdog_start();
     take_reset_cause(board);

@@ -19,6 +19,8 @@ struct board {
     uint32_t steps_late;
     uint32_t steps_stalled; /* missed while the core's own flash bank was erased or written */
     uint32_t pressures_missed;
+    struct hal_pressures pressures; /* the last that were read */
+    bool pressures_old;             /* a step has used them again, or there are none */
     struct tip_stream tip_stream;
     bool outputs_set; /* in the step that runs: what feeds the watchdog */
     bool watchdog_reset;

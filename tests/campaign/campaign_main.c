@@ -6,6 +6,7 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "campaign/emulated.h"
 #include "campaign/series.h"
 #include "campaign/tally.h"
 #include "program/program.h"
@@ -16,6 +17,8 @@
 
 struct options {
     size_t missions;
+    size_t emulated;
+    const char *elf;
     uint64_t seed;
     const char *only;
     const char *csv;
@@ -44,6 +47,8 @@ static const struct argp_option option_list[] = {
     {"missions", 'n', "N", 0, "how many in all (10000)", 0},
     {"seed", 's', "SEED", 0, "of everything (1)", 0},
     {"fault", 'f', "TEXT", 0, "only what has TEXT in its name or in its row of faults.def", 0},
+    {"emulated", 'e', "N", 0, "so many more on the emulated board (0)", 0},
+    {"elf", 'E', "FILE", 0, "what the emulated board runs (build/firmware/tribend.elf)", 0},
     {"csv", 'o', "FILE", 0, "a row a trial", 0},
     {0}};
 
@@ -71,6 +76,15 @@ static error_t parse(int key, char *argument, struct argp_state *state) {
         return 0;
     case 'f':
         options->only = *argument != '\0' ? argument : NULL;
+        return 0;
+    case 'e':
+        if (!whole(argument, &value) || value > 100000) {
+            argp_error(state, "emulated '%s': a whole number from 0 to 100000 is wanted", argument);
+        }
+        options->emulated = (size_t)value;
+        return 0;
+    case 'E':
+        options->elf = argument;
         return 0;
     case 'o':
         options->csv = argument;
@@ -253,14 +267,32 @@ static bool run(struct campaign *campaign, const struct fitting *fitting, const 
     return ran;
 }
 
+/* The ELF that is flashed: each injection once or more, pairs, and missions in which nothing breaks. */
+static bool run_emulated(struct campaign *campaign) {
+    const struct options *options = &campaign->options;
+    const size_t n = options->emulated;
+    const struct series sound = {SERIES_SOUND, options->seed, n / 10 + 1, NULL, options->elf};
+    const struct series single = {SERIES_SINGLE, options->seed, n * 7 / 10 + 1, options->only, options->elf};
+    const struct series pairs = {SERIES_PAIRS, options->seed, n * 2 / 10 + 1, options->only, options->elf};
+    printf("\nSingle faults, on the emulated board:\n");
+    for (size_t k = 0; k < injection_count(); k++) {
+        if (emulated_left_out(injection_at(k)) != NULL) {
+            printf("left out: %s: %s\n", injection_at(k)->name, emulated_left_out(injection_at(k)));
+        }
+    }
+    return run(campaign, &fittings[0], &single, SHOW_SINGLES, "") &&
+           run(campaign, &fittings[0], &pairs, SHOW_ALL, "all pairs") &&
+           run(campaign, &fittings[0], &sound, SHOW_ALL, "nothing");
+}
+
 static bool run_all(struct campaign *campaign) {
     const struct options *options = &campaign->options;
     const size_t n = options->missions;
     const size_t tried = n / FITTING_SHARE / 2 + 1, fitted = sizeof fittings / sizeof fittings[0];
     const size_t main_part = n > 2 * fitted * tried ? n - 2 * fitted * tried : 1;
-    const struct series sound = {SERIES_SOUND, options->seed, main_part / 10 + 1, NULL};
-    const struct series single = {SERIES_SINGLE, options->seed, main_part * 5 / 10 + 1, options->only};
-    const struct series pairs = {SERIES_PAIRS, options->seed, main_part * 4 / 10 + 1, options->only};
+    const struct series sound = {SERIES_SOUND, options->seed, main_part / 10 + 1, NULL, NULL};
+    const struct series single = {SERIES_SINGLE, options->seed, main_part * 5 / 10 + 1, options->only, NULL};
+    const struct series pairs = {SERIES_PAIRS, options->seed, main_part * 4 / 10 + 1, options->only, NULL};
     printf("\nSingle faults, with the shut-off valve:\n");
     bool ran = run(campaign, &fittings[0], &single, SHOW_SINGLES, "");
     printf("\nPairs, and missions in which nothing breaks:\n");
@@ -271,21 +303,21 @@ static bool run_all(struct campaign *campaign) {
     printf("%-34s %-18s %7s %8s %12s %13s %9s\n", "fitted", "broken", "trials", "bursts", "over 50 ms", "never vented",
            "kPa");
     for (size_t f = 0; f < fitted && ran; f++) {
-        struct series stuck = {SERIES_SINGLE, options->seed + 1, tried, "FAULT_VALVE"};
+        struct series stuck = {SERIES_SINGLE, options->seed + 1, tried, "FAULT_VALVE", NULL};
         ran = run(campaign, &fittings[f], &stuck, SHOW_FITTING, "valves");
-        struct series over = {SERIES_PAIRS, options->seed + 2, tried, "SUPPLY_HIGH"};
+        struct series over = {SERIES_PAIRS, options->seed + 2, tried, "SUPPLY_HIGH", NULL};
         ran = ran && run(campaign, &fittings[f], &over, SHOW_FITTING, "supply and another");
     }
-    return ran;
+    return ran && (options->emulated == 0 || run_emulated(campaign));
 }
 
 int main(int argc, char **argv) {
-    struct campaign campaign = {.options = {.missions = 10000, .seed = 1}};
+    struct campaign campaign = {.options = {.missions = 10000, .seed = 1, .elf = "build/firmware/tribend.elf"}};
     argp_err_exit_status = EXIT_USAGE;
     if (argp_parse(&parser, argc, argv, 0, NULL, &campaign.options) != 0) {
         return EXIT_USAGE;
     }
-    const struct series asked = {SERIES_SINGLE, 1, 1, campaign.options.only};
+    const struct series asked = {SERIES_SINGLE, 1, 1, campaign.options.only, NULL};
     if (series_variants(&asked) == 0) {
         return program_fail(EXIT_USAGE, "no fault has '%s' in its name; tests/campaign/injection.c lists them",
                             campaign.options.only);
@@ -307,7 +339,7 @@ int main(int argc, char **argv) {
     const bool written = campaign.csv == NULL || fclose(campaign.csv) == 0;
     table_file_close(&campaign.file);
     if (!ran) {
-        return program_fail(EXIT_OUTPUT, "out of memory");
+        return program_fail(EXIT_OUTPUT, "not all of it was run");
     }
     if (!written) {
         return program_fail(EXIT_OUTPUT, "cannot write %s", campaign.options.csv);

@@ -1,8 +1,10 @@
 #include "campaign/series.h"
 
 #include <stdio.h>
+#include <stdlib.h>
 #include <string.h>
 
+#include "campaign/emulated.h"
 #include "program/program.h"
 
 static bool meant(const struct series *series, size_t injection) {
@@ -10,8 +12,12 @@ static bool meant(const struct series *series, size_t injection) {
     return series->only == NULL || strstr(at->name, series->only) != NULL || strstr(at->row, series->only) != NULL;
 }
 
+static bool can_be_put(const struct series *series, size_t injection) {
+    return series->elf == NULL || emulated_left_out(injection_at(injection)) == NULL;
+}
+
 static bool pair_meant(const struct series *series, size_t a, size_t b) {
-    return meant(series, a) || meant(series, b);
+    return (meant(series, a) || meant(series, b)) && can_be_put(series, a) && can_be_put(series, b);
 }
 
 /* The `index`-th variant; returns how many were passed on the way where there are fewer. */
@@ -59,6 +65,19 @@ static void say(size_t finished, size_t all) {
     }
 }
 
+/* The place's vehicle is from now on the emulated board, which the caller frees. */
+static bool open_board(struct trial_place *place, const char *elf, struct emulated **emulated) {
+    char error[CORE_ERROR_BYTES] = "no memory";
+    *emulated = malloc(sizeof **emulated);
+    if (*emulated == NULL || !emulated_open(*emulated, elf, place->plant_table, &place->table, place->image, error,
+                                            sizeof error)) {
+        fprintf(stderr, "campaign: %s\n", error);
+        return false;
+    }
+    emulated_vehicle(*emulated, &place->vehicle);
+    return true;
+}
+
 bool series_run(const struct series *series, const struct bend_table *table, const struct plant_parameters *plant,
                 struct trial_result *result, bool *done, bool shows_progress) {
     bool memory = true;
@@ -66,7 +85,9 @@ bool series_run(const struct series *series, const struct bend_table *table, con
 #pragma omp parallel
     {
         static __thread struct trial_place place;
-        const bool opened = trial_place_open(&place, table);
+        struct emulated *emulated = NULL;
+        const bool opened = trial_place_open(&place, table) &&
+                            (series->elf == NULL || open_board(&place, series->elf, &emulated));
 #pragma omp critical
         memory = memory && opened;
 #pragma omp for schedule(dynamic)
@@ -84,6 +105,7 @@ bool series_run(const struct series *series, const struct bend_table *table, con
             }
         }
         trial_place_close(&place);
+        free(emulated);
     }
     return memory;
 }

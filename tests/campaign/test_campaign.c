@@ -4,6 +4,7 @@
 
 #include <stdlib.h>
 
+#include "campaign/emulated.h"
 #include "campaign/series.h"
 #include "campaign/tally.h"
 #include "program/table_file.h"
@@ -66,7 +67,7 @@ static void single_faults_are_seen_and_no_limit_is_passed(void **state) {
     (void)state;
     static struct trial_result result[SINGLES];
     struct plant_parameters plant;
-    const struct series series = {SERIES_SINGLE, 2014, SINGLES, NULL};
+    const struct series series = {SERIES_SINGLE, 2014, SINGLES, NULL, NULL};
     size_t ends[TRIAL_END_COUNT] = {0};
     nominal_plant(&plant);
     assert_true(SINGLES % series_variants(&series) == 0);
@@ -82,7 +83,7 @@ static void pairs_burst_nothing(void **state) {
     (void)state;
     static struct trial_result result[PAIRS];
     struct plant_parameters plant;
-    const struct series series = {SERIES_PAIRS, 2014, PAIRS, NULL};
+    const struct series series = {SERIES_PAIRS, 2014, PAIRS, NULL, NULL};
     nominal_plant(&plant);
     run(&series, &plant, result);
 }
@@ -92,7 +93,7 @@ static void sound_missions_raise_no_alarm(void **state) {
     (void)state;
     static struct trial_result result[SOUND];
     struct plant_parameters plant;
-    const struct series series = {SERIES_SOUND, 2014, SOUND, NULL};
+    const struct series series = {SERIES_SOUND, 2014, SOUND, NULL, NULL};
     const uint32_t expected = (1u << WARNING_TIP_LOST) | (1u << WARNING_COMMAND_LIMITED); /* at start; in some bends */
     nominal_plant(&plant);
     run(&series, &plant, result);
@@ -149,13 +150,57 @@ static void a_rail_that_vents_empties_a_chamber_whose_valve_sticks(void **state)
     assert_true(never >= 3);
 }
 
+/* --- the ELF that is flashed, on the emulated board */
+
+static const char *elf(void) {
+    static char path[512];
+    const char *build = getenv("TRIBEND_BUILD");
+    (void)snprintf(path, sizeof path, "%s/firmware/tribend.elf", build != NULL ? build : "build");
+    return path;
+}
+
+/* One fault of each of the ways in which they are put in: pins, air, wires of the bus, memory, program and supply. */
+static void the_emulated_board_is_broken_as_well(void **state) {
+    (void)state;
+    static const char *const names[] = {"wire open",       "valve stuck filling", "bus-off",   "table bit flips",
+                                        "firmware hangs",  "firmware crashes",    "brown-out", "tip scatters",
+                                        "steps often late"};
+    struct plant_parameters plant;
+    size_t filled = 0;
+    nominal_plant(&plant);
+    for (size_t i = 0; i < sizeof names / sizeof names[0]; i++) {
+        static struct trial_result result;
+        const struct series series = {SERIES_SINGLE, 40 + i, 1, names[i], elf()};
+        run(&series, &plant, &result);
+        if (result.end == TRIAL_HARMLESS) {
+            fail_msg("%s is put in and nothing is said", names[i]);
+        }
+        filled += result.oracle.highest_pa > 1000.0 ? 1 : 0;
+    }
+    assert_true(filled >= 6); /* in the middle of something */
+}
+
+/* The same bits again, with another board before it. */
+static void the_emulated_board_flies_the_same_trial_again(void **state) {
+    (void)state;
+    static struct trial_result first, again, other;
+    struct plant_parameters plant;
+    const struct series series = {SERIES_PAIRS, 9, 1, "reading jumps up", elf()},
+                        between = {SERIES_PAIRS, 10, 1, "leaks", elf()};
+    nominal_plant(&plant);
+    run(&series, &plant, &first);
+    run(&between, &plant, &other);
+    run(&series, &plant, &again);
+    assert_memory_equal(&first, &again, sizeof first);
+}
+
 static void the_same_seed_gives_the_same_trial(void **state) {
     (void)state;
     struct trial_place place;
     struct plant_parameters plant;
     struct trial_result first, again;
     struct trial trial;
-    const struct series series = {SERIES_PAIRS, 3, 10, NULL};
+    const struct series series = {SERIES_PAIRS, 3, 10, NULL, NULL};
     nominal_plant(&plant);
     assert_true(trial_place_open(&place, &file.table));
     for (size_t i = 0; i < 3; i++) {
@@ -254,6 +299,8 @@ int main(void) {
         cmocka_unit_test(sound_missions_raise_no_alarm),
         cmocka_unit_test(without_a_shut_off_valve_a_stuck_one_bursts_the_chamber),
         cmocka_unit_test(a_rail_that_vents_empties_a_chamber_whose_valve_sticks),
+        cmocka_unit_test(the_emulated_board_is_broken_as_well),
+        cmocka_unit_test(the_emulated_board_flies_the_same_trial_again),
         cmocka_unit_test(the_same_seed_gives_the_same_trial),
         cmocka_unit_test(findings_stay_mended),
         cmocka_unit_test(every_row_is_injected_or_says_why_not),

@@ -23,9 +23,47 @@ struct script {
     int64_t clear_after_us; /* of the fault that latched */
 };
 
+/* --- the simulated board */
+
+static int64_t start_bench(void *context, const struct plant_parameters *plant, uint64_t seed) {
+    struct trial_place *place = context;
+    struct bench *bench = &place->bench;
+    bench_init(bench, place->plant_table, &place->table, place->image, plant, seed);
+    while (!bench_is_safe(bench) && bench->sim.time_us < EARLIEST_US) {
+        bench_step(bench, NULL);
+    }
+    return bench->sim.time_us;
+}
+
+static void inject_bench(void *context, const struct injection *injection, size_t chamber, struct random_stream *random) {
+    struct trial_place *place = context;
+    injection->apply(&place->bench, chamber, random);
+}
+
+static void step_bench(void *context, const struct controller_command *command) {
+    struct trial_place *place = context;
+    bench_step(&place->bench, command);
+}
+
+static void sample_bench(void *context, struct oracle_sample *sample) {
+    const struct trial_place *place = context;
+    bench_sample(&place->bench, sample);
+}
+
+static void finish_bench(void *context) {
+    struct trial_place *place = context;
+    bench_finish(&place->bench);
+}
+
 bool trial_place_open(struct trial_place *place, const struct bend_table *table) {
     memset(place, 0, sizeof *place);
     place->plant_table = table;
+    place->vehicle = (struct vehicle){.context = place,
+                                      .start = start_bench,
+                                      .inject = inject_bench,
+                                      .step = step_bench,
+                                      .sample = sample_bench,
+                                      .finish = finish_bench};
     place->image = aligned_alloc(16, (table->image_bytes + 15u) / 16u * 16u);
     place->flown_pa = calloc(FLIGHT_STEPS, 3 * sizeof place->flown_pa[0]);
     place->twin_pa = calloc(FLIGHT_STEPS, 3 * sizeof place->twin_pa[0]);
@@ -74,30 +112,21 @@ static bool next_command(const struct mission *mission, const struct script *scr
     return mission_command(mission, time_us, command);
 }
 
-static int64_t start(struct trial_place *place, const struct plant_parameters *plant, uint64_t seed) {
-    struct bench *bench = &place->bench;
-    bench_init(bench, place->plant_table, &place->table, place->image, plant, seed);
-    while (!bench_is_safe(bench) && bench->sim.time_us < EARLIEST_US) {
-        bench_step(bench, NULL);
-    }
-    return bench->sim.time_us;
-}
-
 static bool is_over(const struct oracle *oracle, bool clears, int64_t time_us) {
     return !clears && oracle->vented_us != ORACLE_NEVER && time_us > oracle->fault_us + oracle->vented_us + AFTER_US;
 }
 
-static void inject(struct bench *bench, const struct trial *trial, struct script *script, int64_t at_us) {
+static void inject(const struct vehicle *vehicle, const struct trial *trial, struct script *script, int64_t at_us) {
     for (size_t i = 0; i < 2; i++) {
         if (trial->injection[i] != TRIAL_NONE && at_us == script->at_us[i]) {
-            injection_at(trial->injection[i])->apply(bench, script->chamber[i], &script->random);
+            vehicle->inject(vehicle->context, injection_at(trial->injection[i]), script->chamber[i], &script->random);
         }
     }
 }
 
-static void fly(struct trial_place *place, const struct plant_parameters *plant, const struct trial *trial,
+static void fly(const struct trial_place *place, const struct plant_parameters *plant, const struct trial *trial,
                 struct oracle *oracle, double *flown_pa) {
-    struct bench *bench = &place->bench;
+    const struct vehicle *vehicle = &place->vehicle;
     struct script script;
     struct mission mission;
     struct oracle_sample sample;
@@ -105,16 +134,16 @@ static void fly(struct trial_place *place, const struct plant_parameters *plant,
     const struct oracle_limits limits = {(double)module->working_pressure_pa, (double)module->burst_pressure_pa};
     write_script(&script, trial->seed);
     mission_random(&mission, module, trial->seed);
-    const int64_t start_us = start(place, plant, trial->seed);
+    const int64_t start_us = vehicle->start(vehicle->context, plant, trial->seed);
     const bool nothing = trial->injection[0] == TRIAL_NONE;
     oracle_init(oracle, &limits, start_us + (nothing ? MISSION_LENGTH_US : script.at_us[0]));
     int64_t latched_at_us = ORACLE_NEVER;
     for (int64_t at_us = 0; at_us < MISSION_LENGTH_US; at_us += CONTROLLER_STEP_US) {
         struct controller_command command;
-        inject(bench, trial, &script, at_us);
+        inject(vehicle, trial, &script, at_us);
         const bool sends = next_command(&mission, &script, at_us, latched_at_us, &command);
-        bench_step(bench, sends ? &command : NULL);
-        bench_sample(bench, &sample);
+        vehicle->step(vehicle->context, sends ? &command : NULL);
+        vehicle->sample(vehicle->context, &sample);
         oracle_add(oracle, &sample);
         latched_at_us = latched_at_us == ORACLE_NEVER && sample.faults != 0u ? at_us : latched_at_us;
         memcpy(&flown_pa[3 * (at_us / CONTROLLER_STEP_US)], sample.pressure_pa, sizeof sample.pressure_pa);
@@ -122,7 +151,7 @@ static void fly(struct trial_place *place, const struct plant_parameters *plant,
             break;
         }
     }
-    bench_finish(bench);
+    vehicle->finish(vehicle->context);
 }
 
 /* How far from anything that the twin's chamber had within a short time before or after. */

@@ -1,11 +1,11 @@
-/* One trial of the campaign: a random mission on the simulated board, one or two injections at random times, and what the
- * oracle says of it. A number and a seed give the same trial again, on any machine and thread. */
+/* One trial of the campaign: a random mission on the simulated or the emulated board, one or two injections at random times,
+ * and what the oracle says of it. A number and a seed give the same trial again, on any machine and thread. */
 #ifndef TRIBEND_TRIAL_H
 #define TRIBEND_TRIAL_H
 
 #include "campaign/bench.h"
-#include "campaign/injection.h"
 #include "campaign/mission.h"
+#include "campaign/vehicle.h"
 
 #define TRIAL_NONE SIZE_MAX
 
@@ -20,6 +20,7 @@ struct trial_place {
     struct bend_table table;
     uint8_t *image;
     struct bench bench;
+    struct vehicle vehicle; /* the bench, unless another one is put here */
     double *flown_pa; /* [MISSION_LENGTH_US / CONTROLLER_STEP_US][3] of the last flight, */
     double *twin_pa;  /* and of the same mission in which nothing breaks */
 };

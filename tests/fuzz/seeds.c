@@ -78,13 +78,29 @@ static void seed_motion(void) {
     sequence = 0u;
     put_steps(60u);
     put_bend();
-    put_steps(40u);
+    put_steps(20u);
+    put_bend();
+    put_steps(20u);
     put_message(MESSAGE_HOST_HEARTBEAT, &heartbeat);
     put_message(MESSAGE_HOLD, &hold);
     put_steps(640u);
     put_message(MESSAGE_CLEAR, &clear);
     put_steps(200u);
     put_message(MESSAGE_VENT, &vent);
+    finish();
+}
+
+/* Flying while the board is switched on; then a pause. */
+static void seed_restart(void) {
+    put_byte(3u);
+    sequence = 0u;
+    for (int i = 0; i < 3; i++) {
+        put_bend();
+        put_steps(250u);
+    }
+    put_steps(400u);
+    put_bend();
+    put_steps(20u);
     finish();
 }
 
@@ -161,6 +177,7 @@ static void seed_frames(void) {
     uint8_t image[PARAMETERS_IMAGE_BYTES];
     tiny_table_make(&tiny);
     seed_motion();
+    seed_restart();
     seed_parameters_by_frame();
     seed_transfer(TRANSFER_KIND_PARAMETERS, image, parameter_image(image, 3u));
     seed_transfer(TRANSFER_KIND_TABLE, tiny.image, tiny.bytes);

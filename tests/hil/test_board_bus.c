@@ -30,6 +30,7 @@ static void shorted_wires_put_it_off_the_bus_until_they_are_mended(void **state)
     assert_true(counters->transmit_lost > 0); /* what waited had become old */
     assert_int_equal(hil.last[MESSAGE_HEALTH].health.steps_late, 0);
     hil_assert_state(SUPERVISOR_FAULT);
+    assert_true(hil_has(FAULT_CAN_BUS_OFF)); /* said as soon as it can be */
     hil_off();
 }
 

@@ -7,20 +7,13 @@
 #include <unistd.h>
 
 #include "comms/parameters.h"
-#include "comms/store.h"
-#include "control/bend_table_format.h"
-#include "control/crc32.h"
-#include "hil/hil.h"
+#include "hil/update.h"
 
 #define NOISE_ID 42u /* sensor_noise_pa */
 #define NOISE_OLD 140.0f
 #define NOISE_NEW 160.0f
 #define NOISE_LAST 170.0f
 #define ENDS 12u /* operations at either end that are always cut */
-#define CHUNK 7u
-#define CHUNKS_A_MS 2 /* the node takes three commands a step */
-#define PATIENCE_MS 30
-#define TRANSFER_MS 90000
 #define TABLE_STRIDE 700u
 #define WAKE_MS 60 /* until it answers */
 #define AHEAD 16u  /* more operations than a millisecond has */
@@ -158,82 +151,7 @@ static void cut_parameters_leave_the_old_or_the_new(void **state) {
 
 /* --- a table --- */
 
-struct sender {
-    uint8_t *image;
-    uint32_t bytes, sent;
-    uint32_t reports; /* of the board */
-    int silent_ms;    /* since the last one */
-    bool ended;
-};
-
-static struct sender sender;
 static uint64_t hash_old, hash_new;
-
-/* The reference table again, from other inputs. */
-static void make_table(void) {
-    const uint32_t covered = BEND_TABLE_OFFSET_CRC + 4u;
-    sender = (struct sender){.image = malloc(hil_file.size), .bytes = (uint32_t)hil_file.size};
-    assert_non_null(sender.image);
-    memcpy(sender.image, hil_file.bytes, sender.bytes);
-    memcpy(&hash_old, sender.image + BEND_TABLE_OFFSET_HASH, sizeof hash_old);
-    hash_new = ~hash_old;
-    memcpy(sender.image + BEND_TABLE_OFFSET_HASH, &hash_new, sizeof hash_new);
-    const uint32_t crc = crc32_update(0u, sender.image + covered, sender.bytes - covered);
-    memcpy(sender.image + BEND_TABLE_OFFSET_CRC, &crc, sizeof crc);
-}
-
-static void send_chunk(void) {
-    struct message_transfer_data data = {.chunk = (uint8_t)(sender.sent / CHUNK)};
-    const uint32_t left = sender.bytes - sender.sent;
-    memcpy(&data.data, sender.image + sender.sent, left < CHUNK ? left : CHUNK);
-    hil_send_as_is(MESSAGE_TRANSFER_DATA, &data);
-    sender.sent += CHUNK;
-}
-
-/* What the board has room for, a few frames at a time. */
-static void send_more(void) {
-    const struct message_transfer_state *at = &hil.last[MESSAGE_TRANSFER_STATE].transfer_state;
-    if (at->state != TRANSFER_RECEIVING || sender.ended) {
-        return;
-    }
-    if (hil.heard[MESSAGE_TRANSFER_STATE] != sender.reports) {
-        sender.reports = hil.heard[MESSAGE_TRANSFER_STATE];
-        sender.sent =
-            hil.board.host.waiting_count == 0 || sender.sent < at->offset ? at->offset : sender.sent;
-        sender.silent_ms = 0;
-    } else if (++sender.silent_ms > PATIENCE_MS && sender.sent < sender.bytes) {
-        sender.silent_ms = 0; /* one more, wanted or not, makes the board say where it is */
-        send_chunk();
-    }
-    for (int i = 0;
-         i < CHUNKS_A_MS && sender.sent < sender.bytes && sender.sent + CHUNK <= at->offset + at->room; i++) {
-        send_chunk();
-    }
-    if (at->offset >= sender.bytes) {
-        struct message_transfer_end end = {.protocol = MESSAGE_PROTOCOL,
-                                           .crc = crc32_update(0u, sender.image, sender.bytes)};
-        hil_send(MESSAGE_TRANSFER_END, &end, sizeof end);
-        sender.ended = true;
-    }
-}
-
-static void begin_transfer(void) {
-    const struct message_transfer_begin begin = {
-        .protocol = MESSAGE_PROTOCOL, .kind = TRANSFER_KIND_TABLE, .bytes = sender.bytes};
-    sender.sent = 0u;
-    sender.ended = false;
-    memset(&hil.last[MESSAGE_TRANSFER_STATE], 0, sizeof hil.last[0]);
-    hil_send(MESSAGE_TRANSFER_BEGIN, &begin, sizeof begin);
-}
-
-static uint64_t running_table(void) {
-    const struct message_identify identify = {.protocol = MESSAGE_PROTOCOL};
-    const uint32_t heard = hil.heard[MESSAGE_IDENTITY_TABLE];
-    hil_send(MESSAGE_IDENTIFY, &identify, sizeof identify);
-    hil_run(20);
-    assert_true(hil.heard[MESSAGE_IDENTITY_TABLE] > heard);
-    return hil.last[MESSAGE_IDENTITY_TABLE].identity_table.table_hash;
-}
 
 static bool is_of_use(void) {
     hil_run(HIL_BOOT_MS);
@@ -252,14 +170,14 @@ static bool is_sampled_cut(uint32_t operation) {
 static enum outcome table_after_cut(uint32_t operation) {
     const bool sampled = is_sampled_cut(operation);
     for (int i = 0; i < 3000 && !hil.board.power_lost; i++) {
-        send_more();
+        update_send_more();
         hil_run(1);
     }
     const bool ended = !hil.board.power_lost; /* there was no such operation any more */
     hil.board.flash.cut_at_operation = 0u;
     assert_true(board_power_cycle(&hil.board));
     hil_run(WAKE_MS);
-    const uint64_t hash = running_table();
+    const uint64_t hash = update_running_table();
     const bool sound = (!sampled || is_of_use()) && (!ended || hash == hash_new);
     return !sound             ? OUTCOME_WRONG
            : hash == hash_old ? OUTCOME_OLD
@@ -273,8 +191,8 @@ static uint32_t transfer(void) {
     const struct message_transfer_state *at = &hil.last[MESSAGE_TRANSFER_STATE].transfer_state;
     const uint32_t before = hil.board.flash.operations;
     uint32_t cut = 0; /* the last one */
-    begin_transfer();
-    for (int i = 0; i < TRANSFER_MS && at->state != TRANSFER_DONE && at->state != TRANSFER_FAILED; i++) {
+    update_begin();
+    for (int i = 0; i < UPDATE_MOST_MS && at->state != TRANSFER_DONE && at->state != TRANSFER_FAILED; i++) {
         const uint32_t done = hil.board.flash.operations - before;
         assert_true(!every_cut() || done <= cut); /* else some came in between */
         for (uint32_t next = (done > cut ? done : cut) + 1u; next <= done + AHEAD; next++) {
@@ -285,11 +203,11 @@ static uint32_t transfer(void) {
                 cut = next;
             }
         }
-        send_more();
+        update_send_more();
         hil_run(1);
     }
     if (at->state != TRANSFER_DONE) {
-        fail_msg("transfer at %u of %u: %s", at->offset, sender.bytes,
+        fail_msg("transfer at %u of %u: %s", at->offset, update.bytes,
                  transfer_error_text((enum transfer_error)at->error));
     }
     return hil.board.flash.operations - before;
@@ -298,18 +216,19 @@ static uint32_t transfer(void) {
 static void a_cut_table_leaves_the_old_or_the_new(void **state) {
     (void)state;
     end_if_child();
-    make_table();
     hil_start(2);
-    assert_true(running_table() == hash_old);
+    hash_old = update_running_table();
+    hash_new = ~hash_old;
+    update_make(hash_new);
     memset(seen, 0, sizeof seen);
     const uint32_t operations = transfer();
     print_message("table: %u operations, %u cuts left the old, %u the new\n", operations, seen[OUTCOME_OLD],
                   seen[OUTCOME_NEW]);
     assert_true(seen[OUTCOME_OLD] > 0);
-    assert_true(running_table() == hash_old); /* until the next start */
+    assert_true(update_running_table() == hash_old); /* until the next start */
     switch_on_again();
-    assert_true(running_table() == hash_new);
-    free(sender.image);
+    assert_true(update_running_table() == hash_new);
+    free(update.image);
     hil_off();
 }
 

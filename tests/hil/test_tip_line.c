@@ -168,6 +168,39 @@ static void a_babbling_sensor_is_no_load(void **state) {
     hil_off();
 }
 
+/* What else goes wrong meanwhile is seen as soon as ever: a reading that is lost, one over the limit, a valve that sticks. */
+static void no_fault_is_missed_under_a_bad_line(void **state) {
+    static const wiring_tamper troubles[] = {garbage, half_a_record, wrong_phase, one_byte_lost, zeros, NULL};
+    (void)state;
+    for (size_t i = 0; i < sizeof troubles / sizeof troubles[0]; i++) {
+        for (int fault = 0; fault < 3; fault++) {
+            start_bent(20 + i);
+            hil.board.wiring.tamper = troubles[i];
+            hil.board.wiring.parameters.sensor.tip_period_us = 1000; /* ten times the rate as well */
+            hil_run(300);
+            hil_assert_state(SUPERVISOR_ACTIVE);
+            hil.board.wiring.faults.channel_fails[1] = fault == 0;
+            hil.board.wiring.faults.reading_replaced[0] = fault == 1;
+            hil.board.wiring.faults.reading_pa[0] = 20000.0f;
+            hil.board.wiring.plant.valve[2].stuck = fault == 2 ? VALVE_STUCK_FILLING : hil.board.wiring.plant.valve[2].stuck;
+            hil_watch();
+            int taken_ms = 0;
+            while (hil.board.wiring.supply_open && taken_ms < 500) {
+                hil_run(1);
+                taken_ms++;
+            }
+            assert_in_range(taken_ms, 0, fault == 2 ? 400 : 4);
+            assert_false(hil.board.wiring.coils_driven);
+            hil_run(60);
+            assert_true(hil_has(fault == 0 ? FAULT_SENSOR_RANGE : fault == 1 ? FAULT_OVERPRESSURE : FAULT_VALVE_STUCK_FILLING));
+            assert_under(fmax(fmax(hil.most_pa[0], hil.most_pa[1]), hil.most_pa[2]),
+                         (double)hil_file.table.module.working_pressure_pa);
+            assert_int_equal(hil.board.resets, 0);
+            hil_off();
+        }
+    }
+}
+
 int main(void) {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(random_bytes_are_thrown_away),     cmocka_unit_test(half_records_are_thrown_away),
@@ -175,6 +208,7 @@ int main(void) {
         cmocka_unit_test(records_of_zeros_are_thrown_away),
         cmocka_unit_test(one_bad_record_costs_at_most_two), cmocka_unit_test(ten_times_the_rate_is_taken),
         cmocka_unit_test(a_babbling_sensor_is_no_load),
+        cmocka_unit_test(no_fault_is_missed_under_a_bad_line),
     };
     return cmocka_run_group_tests(tests, hil_open_table, hil_close_table);
 }
