@@ -7,6 +7,7 @@
 #include <stdlib.h>
 #include <string.h>
 #include <time.h>
+#include <unistd.h>
 
 #include "board/board_record.h"
 #include "board/board_changes.h"
@@ -267,6 +268,10 @@ static int open_and_use(struct session *session, const struct bend_table *table)
     board_default_setup(&setup, settings->elf, table);
     setup.seed = settings->seed;
     setup.encode = encode_tip;
+    if (access(settings->elf, F_OK) != 0) {
+        return program_fail(EXIT_BAD_INPUT, "%s: %s: make firmware builds what is flashed, --elf says where it is",
+                            settings->elf, strerror(errno));
+    }
     if (!board_open(&session->board, &setup, error, sizeof error)) {
         return program_fail(EXIT_BAD_INPUT, "%s", error);
     }
