@@ -290,7 +290,7 @@ static int open_and_use(struct session *session, const struct bend_table *table)
 int main(int argc, char **argv) {
     static struct session session;
     static char elf[PROGRAM_PATH_BYTES], found[PROGRAM_PATH_BYTES];
-    struct settings settings = {.seed = 1};
+    static struct settings settings = {.seed = 1};
     struct table_file file;
     argp_err_exit_status = EXIT_USAGE;
     if (argp_parse(&parser, argc, argv, 0, NULL, &settings) != 0) {
