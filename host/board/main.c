@@ -269,7 +269,8 @@ static int open_and_use(struct session *session, const struct bend_table *table)
     setup.seed = settings->seed;
     setup.encode = encode_tip;
     if (access(settings->elf, F_OK) != 0) {
-        return program_fail(EXIT_BAD_INPUT, "%s: %s: make firmware builds what is flashed, --elf says where it is",
+        return program_fail(EXIT_BAD_INPUT,
+                            "%s: %s: make firmware builds what is flashed, --elf says where it is",
                             settings->elf, strerror(errno));
     }
     if (!board_open(&session->board, &setup, error, sizeof error)) {
