@@ -7,6 +7,7 @@
 #include <stdlib.h>
 #include <string.h>
 #include <time.h>
+#include <unistd.h>
 
 #include "board/board_record.h"
 #include "board/board_changes.h"
@@ -267,6 +268,11 @@ static int open_and_use(struct session *session, const struct bend_table *table)
     board_default_setup(&setup, settings->elf, table);
     setup.seed = settings->seed;
     setup.encode = encode_tip;
+    if (access(settings->elf, F_OK) != 0) {
+        return program_fail(EXIT_BAD_INPUT,
+                            "%s: %s: make firmware builds what is flashed, --elf says where it is",
+                            settings->elf, strerror(errno));
+    }
     if (!board_open(&session->board, &setup, error, sizeof error)) {
         return program_fail(EXIT_BAD_INPUT, "%s", error);
     }
@@ -285,7 +291,7 @@ static int open_and_use(struct session *session, const struct bend_table *table)
 int main(int argc, char **argv) {
     static struct session session;
     static char elf[PROGRAM_PATH_BYTES], found[PROGRAM_PATH_BYTES];
-    struct settings settings = {.seed = 1};
+    static struct settings settings = {.seed = 1};
     struct table_file file;
     argp_err_exit_status = EXIT_USAGE;
     if (argp_parse(&parser, argc, argv, 0, NULL, &settings) != 0) {

@@ -24,7 +24,7 @@ while read -r command; do
         done
         grep -qE 'state: SAFE|is heard' "$scratch/said.$commands"
         ;;
-    *) timeout 60 $command >"$scratch/said" 2>&1 </dev/null ;;
+    *) timeout 300 $command >"$scratch/said" 2>&1 </dev/null ;;
     esac
     check "$name" $?
 done < <(sed -n 's/^    //p' docs/board.md)
