@@ -33,6 +33,21 @@ size_t gap_model_parameters(struct gap_model *model, struct gap_parameter parame
     return count;
 }
 
+void gap_model_add(struct gap_model *model, const struct effect *effect) {
+    model->effect[model->count++] = *effect;
+}
+
+bool gap_model_has(const struct gap_model *model, const struct effect_kind *kind, size_t form, size_t chamber) {
+    for (size_t e = 0; e < model->count; e++) {
+        const struct effect *effect = &model->effect[e];
+        const bool same_place = effect->chamber == chamber || effect->chamber == 0 || chamber == 0;
+        if (effect->kind == kind && effect->form == form && same_place) {
+            return true;
+        }
+    }
+    return false;
+}
+
 bool gap_effect_upstream(const struct effect_kind *kind) {
     return effect_has(kind, EFFECT_HOOK_COMMAND) || effect_has(kind, EFFECT_HOOK_GAS) ||
            effect_has(kind, EFFECT_HOOK_READING);

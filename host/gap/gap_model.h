@@ -27,6 +27,10 @@ struct gap_parameter {
 
 /* Fills `parameter`; returns how many. Parameters that data cannot move (probabilities) are left out. */
 size_t gap_model_parameters(struct gap_model *model, struct gap_parameter parameter[GAP_PARAMETERS_MAX]);
+/* The caller sees to it that there is room for one more. */
+void gap_model_add(struct gap_model *model, const struct effect *effect);
+/* Does the model have that form of the kind in that chamber? An effect on all of them (0) is in each. */
+bool gap_model_has(const struct gap_model *model, const struct effect_kind *kind, size_t form, size_t chamber);
 /* Is effect `e` part of a kind that is named elsewhere in the model? Forms of one kind are one effect; and a bent field
  * displaces the rest pose and tilts it too, so offset, lever arm and misalignment beside a distortion are part of that. */
 bool gap_model_is_part(const struct gap_model *model, size_t e);

@@ -1,0 +1,128 @@
+#include "gap/search_parts.h"
+
+#include <math.h>
+
+#define GAIN_SHARE 0.03      /* an effect must take off this share of the held-out squares .. */
+#define GAIN_SIGMA 40.0      /* .. and so much that noise does not */
+#define COMPLETING_SHARE 0.5 /* of what is left, that a further effect must explain */
+/* Shares of the gap, in pressures or at the tip: */
+#define POLISH_SHARE 0.025  /* less than that is left by any form of the right effect, .. */
+#define FORM_LEAST 0.0005   /* .. less than that by most forms of it, .. */
+#define TRACE_LEAST 0.00005 /* .. and less than that by all: no effect is sought for it */
+/* Shares of the whole gap: */
+#define MATERIAL_SHARE 0.0003 /* less than that, elsewhere than the gap lies, is form, .. */
+#define ELSEWHERE_SHARE 3e-5  /* .. down to that, if no simple effect explains it whole */
+#define WHOLE_SHARE 0.95      /* of such a small rest, that an effect must explain, .. */
+#define TRACE_SHARE 0.98      /* .. and of a trace, .. */
+#define TRACE_SIGNAL 10.0     /* .. which is so many times what is worth explaining at all */
+#define FAINT_LEFT 0.25       /* of a faint gap: more than that left means that something else was meant */
+
+double search_held_out(const struct fit *fit) {
+    return fit->sound ? fit_squares(&fit->sums, 1) : INFINITY;
+}
+
+double search_structure(const struct fit *fit) {
+    return fmax(fit_structure(&fit->sums, 1), 0.0);
+}
+
+/* --- what is left --- */
+
+/* Is there more left, in pressures or at the tip, than the noise, than a share of the gap there and than one
+ * of the whole? */
+static bool is_left(const struct search *search, const struct fit *fit, enum fit_group group, double share,
+                    double of_whole) {
+    const double all = fit_structure_of(&search->recalibrated.sums, 1, group);
+    const double least = fmax(share * all, of_whole * search_structure(&search->recalibrated));
+    return fit_structure_of(&fit->sums, 1, group) > fmax(STRUCTURE_LEAST, least);
+}
+
+bool search_has_rest(const struct search *search, const struct fit *fit) {
+    return is_left(search, fit, FIT_PRESSURE, TRACE_LEAST, ELSEWHERE_SHARE) ||
+           is_left(search, fit, FIT_TIP, TRACE_LEAST, ELSEWHERE_SHARE);
+}
+
+bool search_is_structured(const struct fit *fit) {
+    return fit_structure_of(&fit->sums, 1, FIT_PRESSURE) > STRUCTURE_LEAST ||
+           fit_structure_of(&fit->sums, 1, FIT_TIP) > STRUCTURE_LEAST;
+}
+
+/* --- what earns a place --- */
+
+double search_gain_by_noise(const struct fit *after) {
+    return GAIN_SIGMA * fmax(search_held_out(after) / fit_count(&after->sums, 1), 0.2);
+}
+
+bool search_is_better(const struct fit *before, const struct fit *after) {
+    const double gain = search_held_out(before) - search_held_out(after);
+    const double completing = COMPLETING_SHARE * search_structure(before) * fit_count(&before->sums, 1);
+    const double worth = fmin(GAIN_SHARE * search_held_out(before), completing);
+    return gain > worth && gain > search_gain_by_noise(after);
+}
+
+static size_t parts_of(const struct fit *fit, const struct effect_kind *kind) {
+    size_t parts = 0;
+    for (size_t e = 0; e < fit->model.count; e++) {
+        parts += fit->model.effect[e].kind == kind;
+    }
+    return parts;
+}
+
+/* What the second has and the first does not: the last such effect; the last of all where it has only more of
+ * the same. */
+static size_t added(const struct fit *before, const struct fit *after) {
+    size_t place = after->model.count - 1;
+    while (place > 0 && parts_of(before, after->model.effect[place].kind) > 0) {
+        place--;
+    }
+    return parts_of(before, after->model.effect[place].kind) > 0 ? after->model.count - 1 : place;
+}
+
+/* A further effect must be the rest of the explanation, of the pressures or of the tip; not polish on a form
+ * that only nearly fits. A small rest may as well be the form: of that, a simple effect must explain nearly
+ * all, as no form's error is likely to be just what another effect does. */
+static bool completes(const struct search *search, const struct fit *before, const struct fit *after) {
+    const struct effect_kind *kind = after->model.effect[added(before, after)].kind;
+    const bool simple = parts_of(after, kind) == 1;
+    bool any = false;
+    for (int g = gap_effect_upstream(kind) ? FIT_PRESSURE : FIT_TIP; g < FIT_GROUPS; g++) {
+        const enum fit_group group = (enum fit_group)g;
+        const double left = fit_structure_of(&before->sums, 1, group),
+                     then = fit_structure_of(&after->sums, 1, group);
+        const bool halves = then < (1.0 - COMPLETING_SHARE) * left;
+        const bool whole =
+            left > 3.0 * STRUCTURE_LEAST && then < fmax((1.0 - WHOLE_SHARE) * left, STRUCTURE_LEAST);
+        const bool trace = left > TRACE_SIGNAL * STRUCTURE_LEAST && then < (1.0 - TRACE_SHARE) * left;
+        any = any || (is_left(search, before, group, POLISH_SHARE, MATERIAL_SHARE) && halves) ||
+              (simple && ((is_left(search, before, group, FORM_LEAST, ELSEWHERE_SHARE) && whole) ||
+                          (is_left(search, before, group, TRACE_LEAST, ELSEWHERE_SHARE) && trace)));
+    }
+    return any;
+}
+
+/* The same kind twice, though its forms are alternatives and do not add up. */
+static bool repeats_kind(const struct gap_model *model) {
+    for (size_t i = 0; i < model->count; i++) {
+        for (size_t j = 0; j < i; j++) {
+            if (model->effect[i].kind == model->effect[j].kind && !model->effect[i].kind->forms_add &&
+                model->effect[i].chamber == model->effect[j].chamber) {
+                return true;
+            }
+        }
+    }
+    return false;
+}
+
+bool search_earns_place(const struct search *search, const struct fit *before, const struct fit *after) {
+    if (before->model.count == 0) {
+        const bool all_of_it = search_structure(after) < FAINT_LEFT * search_structure(before);
+        return search_is_better(before, after) && (all_of_it || search_structure(before) > FAINT);
+    }
+    const size_t place = added(before, after);
+    const bool adds = after->model.effect[place].kind->forms_add || gap_model_is_part(&after->model, place);
+    if (adds && gap_model_kinds(&after->model) <= gap_model_kinds(&before->model) &&
+        !repeats_kind(&after->model)) {
+        return search_is_better(before, after); /* more of the same kind */
+    }
+    return search_is_better(before, after) && completes(search, before, after) &&
+           !repeats_kind(&after->model);
+}
