@@ -8,7 +8,7 @@
 #include "stm32g4/crash_record.h"
 #include "support/test.h"
 
-#define START_US 500000 /* more than start-up takes */
+#define START_US 1200000 /* more than start-up takes */
 #define NODE 1u
 
 static struct table_file file;

@@ -424,22 +424,23 @@ static void what_the_controller_cannot_use_is_said(void **state) {
 
 /* A bend that swings between 10 and 60 degrees every 15 s while its direction turns, or three pressures that swing. */
 static void swing(struct close_recording *recording, enum close_kind kind, double duration_s) {
-    const double command_s = 0.02;
-    const size_t count = (size_t)(duration_s / command_s);
+    const double command_s = 0.02, rest_s = 1.0; /* of which a controller tests itself for half */
+    const size_t count = (size_t)((rest_s + duration_s) / command_s);
     memset(recording, 0, sizeof *recording);
     recording->kind = kind;
-    recording->duration_us = llround(1e6 * duration_s);
+    recording->duration_us = llround(1e6 * (rest_s + duration_s));
     recording->command = calloc(count, sizeof *recording->command);
     assert_non_null(recording->command);
     for (size_t i = 0; i < count; i++) {
-        const double time_s = command_s * (double)i, phase = 2.0 * M_PI * time_s;
+        const double since_s = command_s * (double)i, time_s = since_s - rest_s, phase = 2.0 * M_PI * time_s;
         struct controller_command command = {.kind = kind == CLOSE_BEND ? COMMAND_BEND : COMMAND_PRESSURE};
+        command.kind = since_s < rest_s ? COMMAND_VENT : command.kind;
         command.bend_rad = (float)(DEGREE * (35.0 - 25.0 * cos(phase / 15.0)));
         command.direction_rad = (float)(DEGREE * (-30.0 + 12.0 * time_s));
         for (size_t c = 0; c < 3 && kind == CLOSE_PRESSURE; c++) {
             command.pressure_pa[c] = (float)(4500.0 - 2500.0 * cos(phase / (12.0 + 3.0 * (double)c)));
         }
-        recording->command[recording->count++] = (struct close_command){llround(1e6 * time_s), command};
+        recording->command[recording->count++] = (struct close_command){llround(1e6 * since_s), command};
     }
 }
 

@@ -25,7 +25,7 @@ static const struct effect_kind supply_droop = {
     .stage = EFFECT_STAGE_SUPPLY,
     .scope = EFFECT_GLOBAL,
     .parameter_count = 2,
-    .parameter = {[DROP_PER_FLOW] = {"drop_per_flow", "Pa s/kg", 0.0, 2e9, 1.5e8, 0.0},
+    .parameter = {[DROP_PER_FLOW] = {"drop_per_flow", "Pa s/kg", 0.0, 1.5e9, 1.5e8, 0.0},
                   [RECOVERY_TIME] = {"recovery_time", "s", 0.05, 3.0, 0.5, NAN}},
     .gas = step};
 
