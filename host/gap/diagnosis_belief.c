@@ -210,6 +210,8 @@ static void believe_effect(struct diagnosis *diagnosis, struct diagnosis_effect 
     }
     if (effect->probability < SURE) {
         name_group(diagnosis, rivals);
+        /* two that each speak for the other under their own weights: neither is left out */
+        add_name(diagnosis, effect->kind->name, effect->probability);
     }
     share_with_twin(diagnosis, effect, search);
     list_rivals(diagnosis, rivals);
