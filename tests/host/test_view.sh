@@ -39,7 +39,7 @@ refuses() {
     check "$name" $result
 }
 
-serve --lease 3s --for 300s
+serve --lease 6s --for 300s
 post=(-H "Authorization: Bearer $token" -d '{"page":"a"}')
 command=(-H "Authorization: Bearer $token" "${address}command" -d)
 refuses no_token_no_data 401 'token is missing or wrong' "${address}module"
