@@ -28,6 +28,7 @@
 
 #include "comms/codec.h"
 #include "link/socketcan.h"
+#include "support/scratch.h"
 #include "safety/supervisor.h"
 #include "tribend_status_t.h"
 
@@ -360,8 +361,8 @@ static uint64_t counter(const char *said, const char *name) {
 }
 
 int main(int argc, char **argv) {
-    char said[] = "/tmp/bench_bridge.XXXXXX";
-    if (argc < 5 || mkstemp(said) < 0) {
+    char said[SCRATCH_BYTES];
+    if (argc < 5) {
         fprintf(stderr, "usage: bench_bridge TRIBEND BUS SECONDS RATE [BRIDGE-OPTION..]\n");
         return 2;
     }
@@ -380,6 +381,10 @@ int main(int argc, char **argv) {
         printf("bus        %" PRIu64 " frames in %.0f s, %.0f a second\n", frames, seconds,
                (double)frames / seconds);
         return 0;
+    }
+    const int file = scratch_file(said);
+    if (file < 0 || close(file) != 0) {
+        stop("a file below TMPDIR");
     }
     const int ear = is_unix ? open_unix(&own) : open_interface(argv[2]);
     const pid_t reader = start_listener(ear, is_unix ? &board : NULL), listener = start_listener(-1, NULL);
@@ -413,6 +418,7 @@ int main(int argc, char **argv) {
     printf("bridge     %" PRIu64 " of %" PRIu64 " frames received, %" PRIu64
            " dropped by the kernel, %" PRIu64 " reports missing, %" PRIu64 " published\n",
            received, frames, dropped, missing, counter(said, "published"));
+    (void)remove(said);
     printf("reader     %" PRIu64 " of %" PRIu64 " frames\n", shared->frames_read, frames);
     print_times("read", &shared->read);
     print_times("on LCM", &shared->published);
