@@ -15,6 +15,8 @@ within 30 told_bend 60 1.5
 check cansend_bends_the_module $?
 told_state $active
 check status_says_active $?
+more_bends() { [ "$(frames "17$node")" -ge "$1" ]; }
+within 30 more_bends $(($(frames "17$node") + 200)) # told_bend may have seen it on its way: settled first, then the mean
 settled_deg=$(bend_deg 100)
 near "$settled_deg" 60 1
 check candump_hears_the_bend_that_was_asked_for $?
