@@ -348,7 +348,7 @@ enum report_index {
     REPORT_COUNT
 };
 _Static_assert((uint32_t)REPORT_COUNT == NODE_REPORT_COUNT && NODE_REPORT_COUNT <= 32u,
-               "a bit and a countdown each");
+               "a bit and a count of turns each");
 
 static const struct report reports[REPORT_COUNT] = {
     [REPORT_STATUS] = {MESSAGE_STATUS, false, fill_status},
@@ -428,15 +428,31 @@ static void note_refusal(struct node *node) {
     node->refused_before = refused;
 }
 
-static void count_down(struct node *node) {
+#define MESSAGE(NAME, name, number, direction, bytes, period_ms, phase_ms, comment)                          \
+    _Static_assert((period_ms) % NODE_TURNS == 0u, #NAME " has its turn every NODE_TURNS steps");
+#include "comms/messages.def"
+
+/* A report can fall due in its turns alone, so that a step looks at few of them. */
+static void set_turns(struct node *node) {
     for (uint32_t r = 0; r < (uint32_t)REPORT_COUNT; r++) {
-        if (node->countdown[r] == 0u) {
-            continue; /* has no period */
+        const struct message_row *row = message_row(reports[r].id);
+        if (row->period_ms > 0u) {
+            node->in_turn[row->phase_ms % NODE_TURNS] |= 1u << r;
+            node->turns_left[r] = row->phase_ms / NODE_TURNS + 1u;
         }
-        node->countdown[r]--;
-        if (node->countdown[r] == 0u) {
-            node->countdown[r] =
-                (uint32_t)message_row(reports[r].id)->period_ms * node->parameters.node.telemetry_slowdown;
+    }
+}
+
+static void count_down(struct node *node) {
+    uint32_t in_turn = node->in_turn[node->turn];
+    node->turn = node->turn + 1u < NODE_TURNS ? node->turn + 1u : 0u;
+    while (in_turn != 0u) {
+        const uint32_t r = (uint32_t)__builtin_ctz(in_turn);
+        in_turn &= in_turn - 1u;
+        node->turns_left[r]--;
+        if (node->turns_left[r] == 0u) {
+            const uint32_t period_ms = message_row(reports[r].id)->period_ms;
+            node->turns_left[r] = period_ms / NODE_TURNS * node->parameters.node.telemetry_slowdown;
             fall_due(node, (enum report_index)r);
         }
     }
@@ -948,10 +964,7 @@ void node_init(struct node *node, const struct node_setup *setup) {
     app_init(&node->app, setup->hal, table_of(node), &node->parameters.controller);
     node->app.parameters_corrupt = store_parameters_lost(&node->store);
     use_parameters(node);
-    for (uint32_t r = 0; r < (uint32_t)REPORT_COUNT; r++) {
-        const struct message_row *row = message_row(reports[r].id);
-        node->countdown[r] = row->period_ms > 0u ? (uint32_t)row->phase_ms + 1u : 0u;
-    }
+    set_turns(node);
     const struct message_tip_position nowhere = {not_a_number(), not_a_number(), not_a_number(), 0u};
     node->tip_position = nowhere;
     const struct message_tip_orientation nohow = {not_a_number(), not_a_number(), not_a_number(),

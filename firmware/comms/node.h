@@ -98,6 +98,7 @@ struct node_counters {
 };
 
 #define NODE_REPORT_COUNT 25u
+#define NODE_TURNS 5u /* steps; every period of messages.def is a multiple of it */
 
 struct node {
     struct app app;
@@ -124,7 +125,9 @@ struct node {
     uint32_t due;     /* and those of them whose period has passed */
     uint32_t next_report;
     bool took_commands; /* in this step */
-    uint32_t countdown[NODE_REPORT_COUNT];
+    uint32_t turn;                          /* of this step, */
+    uint32_t in_turn[NODE_TURNS];           /* the reports that can fall due in each, a bit each, */
+    uint32_t turns_left[NODE_REPORT_COUNT]; /* and when they do */
     uint32_t refusal_next; /* reason of the next REFUSALS */
     uint32_t name_piece;
     enum transfer_error begin_error;
