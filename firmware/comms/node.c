@@ -528,9 +528,9 @@ static uint32_t effort_of(enum report_index report) {
     return report == REPORT_TELEMETRY ? NODE_REPORTS_A_STEP : 1u;
 }
 
-/* A step that took commands has done its share of work. */
+/* A step that took commands or read the tip sensor has done its share of work. */
 static void send_reports(struct node *node) {
-    uint32_t sent = node->took_commands ? 1u : 0u;
+    uint32_t sent = node->took_commands || node->app.input.tip_new ? 1u : 0u;
     while (sent < NODE_REPORTS_A_STEP && node->pending != 0u) {
         const uint32_t report = next_pending(node->pending, node->next_report);
         node->next_report = report;

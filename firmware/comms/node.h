@@ -27,7 +27,7 @@
 
 #define NODE_FRAMES_A_STEP 24u  /* more than a 1 Mbit/s bus carries in a step */
 #define NODE_COMMANDS_A_STEP 2u /* of them, those that are for this node; what is left waits */
-#define NODE_REPORTS_A_STEP 2u  /* frames sent; one in a step that took commands, and one of 64 bytes */
+#define NODE_REPORTS_A_STEP 2u  /* frames sent; one in a step that took commands or a tip sample, and one of 64 bytes */
 
 /* Why a command was refused. */
 #define NODE_REFUSALS(X)                                                                                     \

@@ -6,12 +6,13 @@
  * A step has a bound (tests/bench), so what can wait is spread over steps. Of what looks into the table at length, a step
  * does one: take a tip sample, judge its pose, follow the creep, predict the bend where no sensor tells it, work on the
  * targets, or else renew the chambers' capacities. Valves take a new duty every 10 ms, so a millisecond or two is no loss.
- *   tip         at most every TIP_STEPS, so that the others get their turn; tip sensors give up to 255 samples a second
+ *   tip         a step after it came, since to read it is work, too; at most every TIP_STEPS, so that the others get their
+ *               turn; tip sensors give up to 255 samples a second
  *   inversion   one look at the table a step; what Newton makes of the first is within 0.1 degree of the answer already
  *   capacity    two chambers a step, and one at the latest after CAPACITY_STEPS: in 3 ms of full flow it changes by some 2 %
  *   late valve  its duty is worked out once a period, in one of the last three steps before it: the forecast through the
  *               pulses on their way is long, and only the duty at the period's start counts
- *   table       a part of its CRC-32, a small one but in steps that have only capacities to renew */
+ *   table       a part of its CRC-32, a small one but in steps that have only capacities to renew and no tip sample read */
 #include "control/controller.h"
 
 #include <stddef.h>
@@ -237,6 +238,7 @@ static void receive_tip(struct controller *controller, const struct controller_i
         return;
     }
     controller->status.tip_overtaken += controller->tip_waits ? 1u : 0u;
+    controller->tip_since = controller->tip_waits ? controller->tip_since : controller->step;
     controller->tip_waits = true;
     tip->measured_us = input->tip_measured_us - controller->parameters.calibration.tip_late_us;
     tip->status = input->tip_status;
@@ -306,6 +308,11 @@ static bool has_late_turn(const struct controller *controller, uint32_t c) {
     return parameters->late_us > 0 && left_us > (int32_t)c * step_us && left_us <= ((int32_t)c + 1) * step_us;
 }
 
+static bool is_tip_due(const struct controller *controller) {
+    return controller->tip_waits && controller->tip_since != controller->step &&
+           controller->step - controller->tip_taken >= TIP_STEPS;
+}
+
 /* This step's one look into the table at length. `aims`: the targets want it. */
 static enum look look(struct controller *controller, int64_t time_us, bool aims) {
     const bool overdue = controller->step - controller->capacity_taken > CAPACITY_STEPS;
@@ -315,7 +322,7 @@ static enum look look(struct controller *controller, int64_t time_us, bool aims)
     }
     if (overdue) {
         update_capacities(controller, 1u);
-    } else if (controller->tip_waits && controller->step - controller->tip_taken >= TIP_STEPS) {
+    } else if (is_tip_due(controller)) {
         follow_tip(controller, time_us);
     } else if (controller->pose_waits) {
         judge_pose(controller);
@@ -606,7 +613,7 @@ void controller_step(struct controller *controller, const struct controller_inpu
     const enum look looks = look(controller, input->time_us, aims);
     watch_tip(controller, input->time_us);
     const bool late = has_late_turn(controller, 0u) || has_late_turn(controller, 1u) || has_late_turn(controller, 2u);
-    supervise(controller, &corrected, input, late || looks != LOOK_IDLE);
+    supervise(controller, &corrected, input, late || input->tip_new || looks != LOOK_IDLE);
     aim(controller, looks == LOOK_FOR_TARGETS);
     drive(controller, &corrected, output);
     report_bend(controller);

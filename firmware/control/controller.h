@@ -143,7 +143,8 @@ struct controller {
     uint32_t capacity_next;  /* the chamber whose turn it is */
     uint32_t capacity_taken; /* step of the last */
     uint32_t step;
-    uint32_t tip_taken;  /* step of the last tip sample */
+    uint32_t tip_taken;  /* step of the last tip sample, */
+    uint32_t tip_since;  /* and since when one waits */
     bool tip_lost;
     bool targets_stale;  /* a new command or tip sample since the targets were taken up */
     bool inverting;      /* the inversion is under way */
