@@ -10,9 +10,9 @@
  *               turn; tip sensors give up to 255 samples a second
  *   inversion   one look at the table a step; what Newton makes of the first is within 0.1 degree of the answer already
  *   capacity    two chambers a step, and one at the latest after CAPACITY_STEPS: in 3 ms of full flow it changes by some 2 %
- *   late valve  its duty is worked out once a period, in one of the last three steps before it: the forecast through the
- *               pulses on their way is long, and only the duty at the period's start counts
- *   table       a part of its CRC-32, a small one but in steps that have only capacities to renew and no tip sample read */
+ *   duty        once a period, in one of the last three steps before it, a chamber each: only the duty at the period's start
+ *               counts
+ *   table       a part of its CRC-32, a small one but in steps that have only capacities to renew: no duty, no tip sample */
 #include "control/controller.h"
 
 #include <stddef.h>
@@ -301,11 +301,12 @@ static void report_bend(struct controller *controller) {
     controller->status.bend_is_measured = !controller->tip_lost;
 }
 
-/* A late valve's duty has its turn in one of the last steps of a period. */
-static bool has_late_turn(const struct controller *controller, uint32_t c) {
-    const struct pressure_loop_parameters *parameters = &controller->loop_parameters[c];
-    const int32_t left_us = (int32_t)parameters->pwm_period_us - controller->clock.phase_us, step_us = CONTROLLER_STEP_US;
-    return parameters->late_us > 0 && left_us > (int32_t)c * step_us && left_us <= ((int32_t)c + 1) * step_us;
+/* A valve's duty has its turn in one of the last steps of a period. */
+static bool has_turn(const struct controller *controller, uint32_t c) {
+    const int32_t period_us = (int32_t)controller->loop_parameters[c].pwm_period_us, step_us = CONTROLLER_STEP_US;
+    const int32_t left_us = period_us - controller->clock.phase_us, last = period_us / step_us - 1;
+    const int32_t turn = (int32_t)c < last ? (int32_t)c : last;
+    return left_us > turn * step_us && left_us <= (turn + 1) * step_us;
 }
 
 static bool is_tip_due(const struct controller *controller) {
@@ -564,8 +565,7 @@ static void drive(struct controller *controller, const struct controller_input *
         output->duty[c] = 0.0f;
         if (!output->valves_enabled) {
             pressure_loop_vent(loop, parameters, &controller->clock);
-        } else if (parameters->late_us == 0 || has_late_turn(controller, c) ||
-                   !(controller->status.pressure_target_pa[c] > 0.0f)) {
+        } else if (has_turn(controller, c) || !(controller->status.pressure_target_pa[c] > 0.0f)) {
             output->duty[c] = pressure_loop_duty(loop, parameters, controller->status.pressure_target_pa[c],
                                                  supply_of(controller, input), controller->capacity_m3[c],
                                                  &controller->clock);
@@ -612,8 +612,8 @@ void controller_step(struct controller *controller, const struct controller_inpu
     const bool aims = controller->inverting || controller->targets_stale || input->command.kind != COMMAND_NONE;
     const enum look looks = look(controller, input->time_us, aims);
     watch_tip(controller, input->time_us);
-    const bool late = has_late_turn(controller, 0u) || has_late_turn(controller, 1u) || has_late_turn(controller, 2u);
-    supervise(controller, &corrected, input, late || input->tip_new || looks != LOOK_IDLE);
+    const bool drives = has_turn(controller, 0u) || has_turn(controller, 1u) || has_turn(controller, 2u);
+    supervise(controller, &corrected, input, drives || input->tip_new || looks != LOOK_IDLE);
     aim(controller, looks == LOOK_FOR_TARGETS);
     drive(controller, &corrected, output);
     report_bend(controller);
