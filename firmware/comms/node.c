@@ -15,6 +15,7 @@
 #define NAME_PIECE_BYTES 7u
 #define TIP_TIME_SHIFT 6u /* units of 64 us */
 #define AGE_MOST 0x7fffffffu
+#define FIELDS_A_STEP 11u /* a third of TELEMETRY's */
 
 _Static_assert((uint32_t)FAULT_COUNT <= 32u, "STATUS.faults has 32 bits");
 _Static_assert((uint32_t)WARNING_COUNT <= 16u, "STATUS.warnings has 16 bits");
@@ -503,8 +504,30 @@ static void note_sent(struct node *node, enum report_index report) {
     }
 }
 
+/* Its share of this step; it stays pending until its last part is sent. False: no room on the bus, it begins anew. */
+static bool send_part(struct node *node, enum report_index report) {
+    const struct hal_bus *bus = node->setup->bus;
+    const enum message_id id = reports[report].id;
+    struct node_long_report *part = &node->long_report;
+    struct hal_can_frame frame;
+    if (!part->begun) {
+        reports[report].fill(node, &part->message);
+        message_pack_begin(id, &part->packing);
+    }
+    part->begun = !message_pack_some(id, &part->message, FIELDS_A_STEP, &part->packing, &node->counters.reported);
+    if (part->begun) {
+        return true;
+    }
+    message_pack_end(id, &part->packing, node->node_id, &frame);
+    if (!bus->send(bus->context, &frame)) {
+        return false;
+    }
+    note_sent(node, report);
+    return true;
+}
+
 /* False: no room on the bus; it stays pending. */
-static bool send_report(struct node *node, enum report_index report) {
+static bool send_whole(struct node *node, enum report_index report) {
     const struct hal_bus *bus = node->setup->bus;
     struct hal_can_frame frame;
     union message message;
@@ -523,22 +546,21 @@ static uint32_t next_pending(uint32_t pending, uint32_t from) {
     return (uint32_t)__builtin_ctz(later != 0u ? later : pending);
 }
 
-/* A long frame takes as long to build as two short ones. */
-static uint32_t effort_of(enum report_index report) {
-    return report == REPORT_TELEMETRY ? NODE_REPORTS_A_STEP : 1u;
-}
-
-/* A step that took commands or read the tip sensor has done its share of work. */
+/* A step that took commands or read the tip sensor has done its share of work; a part of a long frame is a share, too. */
 static void send_reports(struct node *node) {
     uint32_t sent = node->took_commands || node->app.input.tip_new ? 1u : 0u;
     while (sent < NODE_REPORTS_A_STEP && node->pending != 0u) {
-        const uint32_t report = next_pending(node->pending, node->next_report);
-        node->next_report = report;
-        if (!send_report(node, (enum report_index)report)) {
+        const uint32_t next = next_pending(node->pending, node->next_report);
+        const enum report_index report = (enum report_index)next;
+        const bool is_long = report == REPORT_TELEMETRY;
+        node->next_report = next;
+        if (!(is_long ? send_part(node, report) : send_whole(node, report))) {
             return;
         }
-        sent += effort_of((enum report_index)report);
-        node->next_report = report + 1u < (uint32_t)REPORT_COUNT ? report + 1u : 0u;
+        sent += is_long ? NODE_REPORTS_A_STEP : 1u;
+        if (!node->long_report.begun) {
+            node->next_report = next + 1u < (uint32_t)REPORT_COUNT ? next + 1u : 0u;
+        }
     }
 }
 

@@ -27,7 +27,7 @@
 
 #define NODE_FRAMES_A_STEP 24u  /* more than a 1 Mbit/s bus carries in a step */
 #define NODE_COMMANDS_A_STEP 2u /* of them, those that are for this node; what is left waits */
-#define NODE_REPORTS_A_STEP 2u  /* frames sent; one in a step that took commands or a tip sample, and one of 64 bytes */
+#define NODE_REPORTS_A_STEP 2u  /* frames sent; one in a step that took commands or a tip sample, and a part of one of 64 bytes */
 
 /* Why a command was refused. */
 #define NODE_REFUSALS(X)                                                                                     \
@@ -100,6 +100,13 @@ struct node_counters {
 #define NODE_REPORT_COUNT 25u
 #define NODE_TURNS 5u /* steps; every period of messages.def is a multiple of it */
 
+/* One of 64 bytes, which is built in some steps. */
+struct node_long_report {
+    bool begun;
+    union message message;
+    struct message_packing packing;
+};
+
 struct node {
     struct app app;
     struct parameters parameters; /* as set; what the controller runs on */
@@ -124,6 +131,7 @@ struct node {
     uint32_t pending; /* reports to send, a bit each, */
     uint32_t due;     /* and those of them whose period has passed */
     uint32_t next_report;
+    struct node_long_report long_report;
     bool took_commands; /* in this step */
     uint32_t turn;                          /* of this step, */
     uint32_t in_turn[NODE_TURNS];           /* the reports that can fall due in each, a bit each, */

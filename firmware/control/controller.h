@@ -84,6 +84,7 @@ struct controller_output {
 };
 
 struct controller_tip {
+    int64_t came_us;
     int64_t measured_us;
     float position_m[3];
     float quaternion[4];
@@ -136,9 +137,11 @@ struct controller {
     struct controller_tip tip;    /* a sample, waiting or taken last */
     struct controller_command active;
     int64_t command_us;
-    int64_t tip_us;
+    int64_t tip_us; /* when the last good sample came */
     struct bend_inverse inversion;
     struct pressure_loop_clock clock;
+    int64_t period_start_us; /* of the valves */
+    int32_t steps_left;      /* of that period, after this one */
     float capacity_m3[3];
     uint32_t capacity_next;  /* the chamber whose turn it is */
     uint32_t capacity_taken; /* step of the last */
