@@ -10,8 +10,8 @@
  *         if (node.reset_wanted) ...       // vent, then reset: a host asked for it while vented
  *
  * Nothing of it blocks, and each step's work is bounded: node_step() and node_report() together take some
- * 1,500 instructions of a Cortex-M4F at most while a host commands and hears, 2,200 with two commands in
- * every step, about 100 more for each foreign frame that the bus hands over, and up to 5,000 for one step of
+ * 1,500 instructions of a Cortex-M4F at most while a host commands and hears, 2,400 with two commands in
+ * every step, about 100 more for each foreign frame that the bus hands over, and up to 9,000 for one step of
  * a table's check, while vented. Commands come in the messages of messages.def; one that is malformed, out of
  * range, of another version, stale or out of place is refused, counted by its reason and reported. VENT is
  * obeyed whatever it holds, and wins over whatever came in the same step. Not here: the bits of messages
