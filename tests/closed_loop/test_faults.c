@@ -115,7 +115,7 @@ static void table_corrupt(void **state) {
         start_mission(&rig, mission, &rig_file.table);
         rig.sim.sim.table = &plant.table;
         rig_file.bytes[byte] ^= 0x01u; /* the last bit of a number, mostly: the command stays nearly what it was */
-        const int steps = expect_fault(&rig, FAULT_TABLE_CORRUPT, 20 * round_ms);
+        const int steps = expect_fault(&rig, FAULT_TABLE_CORRUPT, 2 * round_ms);
         rig_file.bytes[byte] ^= 0x01u;
         slowest_ms = steps > slowest_ms ? steps : slowest_ms;
         table_file_close(&plant);
