@@ -10,10 +10,10 @@
  *               turn; tip sensors give up to 255 samples a second
  *   inversion   one look at the table a step; what Newton makes of the first is within 0.1 degree of the answer already
  *   capacity    two chambers a step, and one at the latest after CAPACITY_STEPS: in 3 ms of full flow it changes by some 2 %
- *   duty        once a period, in one of the last three steps before it, a chamber each: only the duty at the period's start
- *               counts
- *   table       a part of its CRC-32: none in a step that takes a tip sample, a large one in a step that has only capacities
- *               to renew: no tip sample to read, no late valve's duty, whose forecast through pulses on their way is long */
+ *   duty        once a period, in the last step before it: only the duty at the period's start counts; a late valve's, whose
+ *               forecast through the pulses on their way is long, in one of the last three, a chamber each
+ *   table       a part of its CRC-32: none in a step that takes a tip sample, nor in one that works out duties and has more
+ *               to do; a large one in a step that has only capacities to renew: no tip sample to read, no duty */
 #include "control/controller.h"
 
 #include <stddef.h>
@@ -318,10 +318,12 @@ static void report_bend(struct controller *controller) {
     controller->status.bend_is_measured = !controller->tip_lost;
 }
 
-/* A valve's duty has its turn in one of the last steps of a period. */
+/* A valve's duty has its turn in the last step of a period, a late one's in one of the last. */
 static bool has_turn(const struct controller *controller, uint32_t c) {
-    const int32_t last = (int32_t)controller->loop_parameters[c].pwm_period_us / CONTROLLER_STEP_US - 1;
-    return controller->steps_left == ((int32_t)c < last ? (int32_t)c : last);
+    const struct pressure_loop_parameters *parameters = &controller->loop_parameters[c];
+    const int32_t last = (int32_t)parameters->pwm_period_us / CONTROLLER_STEP_US - 1;
+    const int32_t turn = parameters->late_us > 0 ? (int32_t)c : 0;
+    return controller->steps_left == (turn < last ? turn : last);
 }
 
 /* Of a late valve's duty, through the pulses that are on their way. */
@@ -337,10 +339,11 @@ static bool forecasts_long(const struct controller *controller) {
 static uint32_t table_bytes_for(const struct controller *controller, const struct controller_input *input,
                                 enum look looks) {
     const struct limits_parameters *parameters = &controller->parameters.limits;
-    if (looks == LOOK_AT_TIP) {
+    const bool drives = controller->steps_left == 0, idle = looks == LOOK_IDLE;
+    if (looks == LOOK_AT_TIP || (drives && !idle)) {
         return 0u;
     }
-    const bool busy = looks != LOOK_IDLE || input->tip_new || forecasts_long(controller);
+    const bool busy = drives || !idle || input->tip_new || forecasts_long(controller);
     return busy ? parameters->table_bytes_busy : parameters->table_bytes_per_step;
 }
 

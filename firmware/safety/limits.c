@@ -18,8 +18,8 @@ void limits_default_parameters(struct limits_parameters *parameters, const struc
         .over_working_steps = 20u,
         .sensor_least_pa = -2500.0f,
         .sensor_most_pa = 49900.0f,   /* of a range that ends at 50 kPa: a broken wire reads full scale */
-        .table_bytes_per_step = 320u, /* a round of the reference table takes about a second */
-        .table_bytes_busy = 128u,     /* 1.9 s, were every step busy and the tip sensor at its fastest */
+        .table_bytes_per_step = 448u, /* a round of the reference table takes about a second */
+        .table_bytes_busy = 144u,     /* 1.9 s, were every step busy and the tip sensor at its fastest */
         .parameter_bytes_per_step = 16u,
     };
 }

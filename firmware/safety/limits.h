@@ -17,7 +17,8 @@ struct limits_parameters {
     float sensor_least_pa; /* readings outside are a sensor fault */
     float sensor_most_pa;
     uint32_t table_bytes_per_step; /* of the table's image checked in a step that has little else to do ... */
-    uint32_t table_bytes_busy;     /* ... and in one that has; none in one that follows a tip sample */
+    uint32_t table_bytes_busy;     /* ... and in one that has; none in one that follows a tip sample, or has much to
+                                      do and works out duties */
     uint32_t parameter_bytes_per_step; /* of the parameters, in each step */
 };
 
