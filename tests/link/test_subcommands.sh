@@ -15,7 +15,7 @@ plainly=()
 gives() {
     local code=$1 pattern=$2
     shift 2
-    timeout 20 "${plainly[@]}" "$tribend" "$@" >/dev/null 2>"$scratch/said" </dev/null
+    timeout 120 "${plainly[@]}" "$tribend" "$@" >/dev/null 2>"$scratch/said" </dev/null
     local status=$?
     [ "$status" -eq "$code" ] && grep -qE -- "$pattern" "$scratch/said" && return
     echo "exit code $status, wanted $code and /$pattern/: tribend $*" >>"$scratch/said"
@@ -54,18 +54,12 @@ declare -A writes=(
 
 "$build/tests/link/stub/board_stub" "$scratch/bus" >"$scratch/states" 2>&1 &
 stub=$!
-for _ in $(seq 100); do
-    ! grep -q SAFE "$scratch/states" || break
-    sleep 0.02
-done
+until_true grep -q SAFE "$scratch/states"
 : >"$scratch/none"
 : >"$scratch/locked" && chmod 000 "$scratch/locked"
 "$build/tests/link/stub/board_stub" "$scratch/locked_bus" >/dev/null 2>&1 &
 locked=$!
-for _ in $(seq 100); do
-    [ ! -e "$scratch/locked_bus" ] || break
-    sleep 0.02
-done
+until_true test -e "$scratch/locked_bus"
 chmod 000 "$scratch/locked_bus"
 
 listed() { "$tribend" "$@" 2>&1 | sed -n 's/^  \([a-z]*\)  .*/\1/p'; }
