@@ -29,7 +29,7 @@ stop() {
 refuses() {
     local name=$1 status=$2 pattern=$3
     shift 3
-    curl -s -m 120 -o "$scratch/body" -w '%{http_code}' "$@" >"$scratch/status"
+    curl -sS -m 120 -o "$scratch/body" -w '%{http_code}' "$@" >"$scratch/status"
     [ "$(cat "$scratch/status")" = "$status" ] && grep -qE "\"error\":\".*$pattern" "$scratch/body"
     local result=$?
     [ $result = 0 ] || echo "$(cat "$scratch/status") $(cat "$scratch/body")"

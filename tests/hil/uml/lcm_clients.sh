@@ -2,6 +2,8 @@
 # and canplayer. A mission flown over LCM and replayed from its log bends the module alike; so say board, candump and log.
 . tests/hil/uml/guest.sh
 mission=$TRIBEND_BUILD/tests/hil/uml/mission
+shown="$SCRATCH/bridge_1.out $SCRATCH/bridge_2.out"
+touch "$SCRATCH/bridge_1.out" "$SCRATCH/bridge_2.out"
 safe=2
 plant() { # NAME AWK-PROGRAM over the board's own record, columns by name in c[]
     awk -F, '/^#/ { next } !n { for (i = 1; i <= NF; i++) c[$i] = i; n = 1; next } '"$2" "$SCRATCH/$1.csv"
