@@ -7,8 +7,8 @@
 #include "cli/report_json.h"
 #include "comms/node.h"
 
-#define WITHIN_US 1500000
-#define AGAIN_US 300000
+#define WITHIN_US 2500000
+#define AGAIN_US 700000 /* nearer to the last one, refused or not, the controller takes it for one of a stream */
 #define WORDS_BYTES 512
 
 static const char usage[] =

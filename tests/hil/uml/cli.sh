@@ -36,11 +36,11 @@ check another_module_is_there $?
 gives 9 'nothing to hold' hold --bus vcan0
 check nothing_to_hold $?
 
-gives 0 'bend +(39|40)\.' bend 40deg --toward 30deg --for 2.5s -q --bus vcan0 --record "$SCRATCH/run.csv"
+gives 0 'bend +(39|40)\.' bend 40deg --toward 30deg --for 5s -q --bus vcan0 --record "$SCRATCH/run.csv"
 check bend $?
 near "$(row_rate "$SCRATCH/run.csv")" 200 2
 check its_log_has_200_rows_a_second $?
-gives 0 'pressures +3\.9|pressures +4\.' pressure 40mbar 0mbar 0mbar --for 1.5s -q --bus vcan0
+gives 0 'pressures +3\.9|pressures +4\.' pressure 40mbar 0mbar 0mbar --for 4s -q --bus vcan0
 check pressure $?
 cat >"$SCRATCH/plan.yaml" <<'YAML'
 module: paper-semicircle
@@ -96,7 +96,7 @@ until_true told_fd
 check telemetry_comes_by_can_fd_after_the_next_start $?
 gives 0 'tip_gain.*0\.21' params get tip_gain --bus vcan0
 check saved_parameters_outlast_the_start $?
-gives 0 'bend +(39|40)\.' bend 40deg --for 2.5s -q --bus vcan0 --record "$SCRATCH/fd.csv"
+gives 0 'bend +(39|40)\.' bend 40deg --for 5s -q --bus vcan0 --record "$SCRATCH/fd.csv"
 check bend_with_can_fd $?
 near "$(row_rate "$SCRATCH/fd.csv")" 200 2
 check its_log_has_200_rows_a_second_too $?

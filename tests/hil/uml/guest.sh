@@ -15,7 +15,7 @@ short_pause() { read -rt 0.1 -u 9 || true; }
 board_start() {
     local name=$1
     shift
-    nice -n 19 "$tribend" board --elf "$elf" --bus vcan0 --record "$SCRATCH/$name.csv" "$@" >"$SCRATCH/$name.out" 2>&1 &
+    nice -n 5 "$tribend" board --elf "$elf" --bus vcan0 --record "$SCRATCH/$name.csv" "$@" >"$SCRATCH/$name.out" 2>&1 &
     board=$!
 }
 # board_ready: until the board that was just started has been through its self-test; what candump wrote of others is not it
