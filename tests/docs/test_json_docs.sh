@@ -52,7 +52,7 @@ check interrupted_is_told_in_the_object $?
 # a board on a bus
 "$build/tests/link/stub/board_stub" "$scratch/bus" >"$scratch/states" 2>&1 &
 board=$!
-until_true grep -q SAFE "$scratch/states"
+until_true grep -qs SAFE "$scratch/states"
 object bus 0 "$tribend" bend 20deg --for 1s --json --bus "unix:$scratch/bus"
 "$tribend" bend 30deg --for 1000min -q --bus "unix:$scratch/bus" >"$scratch/first" 2>&1 &
 
