@@ -1,5 +1,6 @@
 # Inside user-mode Linux: the emulated board on vcan0, commanded with real cansend, heard with real candump.
 . tests/hil/uml/guest.sh
+BOARD_NICE=19 # a process for each command
 safe=2 active=3 fault=5 timeout_fault=4
 plant() { # NAME AWK-PROGRAM over the board's own record, columns by name in c[]
     awk -F, '/^#/ { next } !n { for (i = 1; i <= NF; i++) c[$i] = i; n = 1; next } '"$2" "$SCRATCH/$1.csv"

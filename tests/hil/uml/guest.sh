@@ -12,10 +12,11 @@ short_pause() { read -rt 0.1 -u 9 || true; }
 
 # board_start NAME [options]: the emulated board on vcan0, its record in NAME.csv and its words in NAME.out once it ends. There
 # is one processor in here: clients that keep to a schedule go first, and a board that is held up only counts its time slower.
+# BOARD_NICE: by how much; a bridge takes two seconds of a board that is held up for its silence.
 board_start() {
     local name=$1
     shift
-    nice -n 5 "$tribend" board --elf "$elf" --bus vcan0 --record "$SCRATCH/$name.csv" "$@" >"$SCRATCH/$name.out" 2>&1 &
+    nice -n "${BOARD_NICE:-5}" "$tribend" board --elf "$elf" --bus vcan0 --record "$SCRATCH/$name.csv" "$@" >"$SCRATCH/$name.out" 2>&1 &
     board=$!
 }
 # board_ready: until the board that was just started has been through its self-test; what candump wrote of others is not it

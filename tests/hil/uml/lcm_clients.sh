@@ -113,6 +113,7 @@ has_refused() { bridge_tells && [ "$refused" -gt "$1" ]; }
 until_true has_refused 5
 [ "$open" -eq 0 ] && [ "$refused" -gt 5 ] && [ "$forwarded" -eq 0 ] && told_state $safe
 check flying_command_is_refused $?
+echo "flying: gate open $open, refused $refused, forwarded $forwarded"
 kill -9 "$flying"
 wait "$flying" 2>/dev/null
 refuses_no_more() {
