@@ -14,6 +14,7 @@ struct arguments {
 static const struct argp_option options[] = {
     {"toward", 'w', "ANGLE", 0, "where the tip moves, from +x counter-clockwise (default 0deg)", 0},
     {"co-contraction", 'c', "PRESSURE", 0, "least pressure of every chamber (default 0kPa)", 0},
+    {"json", 'j', NULL, 0, "for programs: one JSON object, in place of the words", 0},
     {0}};
 
 static error_t parse(int key, char *argument, struct argp_state *state) {
@@ -30,6 +31,9 @@ static error_t parse(int key, char *argument, struct argp_state *state) {
         if (!(arguments->co_contraction_pa >= 0.0)) {
             argp_error(state, "--co-contraction: %s is negative", argument);
         }
+        return 0;
+    case 'j':
+        arguments->bus.json = true;
         return 0;
     case ARGP_KEY_ARG:
         if (state->arg_num > 0) {
@@ -52,7 +56,9 @@ static error_t parse(int key, char *argument, struct argp_state *state) {
 static const struct argp_child children[] = {{&bus_options_parser, 0, NULL, 1}, {0}};
 static const struct argp parser = {options, parse, "BEND",
                                    "Bend the tip to BEND in a direction and keep it there in closed loop, then vent.\v"
-                                   "Example: tribend bend 60deg --toward 30deg --for 5s",
+                                   "Examples:\n"
+                                   "  tribend bend 60deg --toward 30deg --for 5s\n"
+                                   "  tribend bend 60deg --json",
                                    children, NULL, NULL};
 
 int cli_bend(int argc, char **argv) {

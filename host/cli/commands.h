@@ -48,6 +48,7 @@ struct bus_options {
     uint64_t seed;
     double duration_s;
     bool quiet;
+    bool json;              /* one object for programs in place of words, where the subcommand has it */
     bool hold_on_interrupt; /* Ctrl-C holds the pressures, a second one vents */
     bool needs_table;       /* of the board, in a file on this computer */
     bool vent_at_once;      /* before anything is known of the board, whatever its version */
@@ -67,6 +68,9 @@ void cli_quantity(struct argp_state *state, const char *what, int kind, const ch
 
 /* A whole number, or a message that names the option and its bounds. */
 int cli_whole_number(struct argp_state *state, const char *option, const char *text, int least, int most);
+/* Whether each of the files could be written, NULL where there is none; an exit code, with the message
+ * printed. */
+int cli_check_outputs(const char *const *path, size_t count);
 /* Worker threads of --threads. */
 int cli_threads(struct argp_state *state, const char *text);
 
@@ -96,8 +100,8 @@ int bus_open_can(struct bus *bus, const struct bus_options *options);
 void bus_close(struct bus *bus);
 /* Open the bus of `options`, `work` on it, close it; returns an exit code. */
 int bus_run(const struct bus_options *options, int (*work)(struct bus *bus, void *input), void *input);
-/* The arguments of a subcommand that has the options of a bus alone; returns an exit code. `usage`: argp's
- * text after them. */
+/* The arguments of a subcommand that has the options of a bus and --json alone; returns an exit code. `usage`:
+ * argp's text after them. */
 int bus_parse_alone(const char *name, const char *usage, int argc, char **argv, struct bus_options *options);
 /* Faults that a drill puts into the simulation. */
 void bus_drill(struct bus *bus, const struct bus_options *options);

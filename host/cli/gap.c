@@ -196,6 +196,11 @@ static int run_diagnose(int argc, char **argv) {
     if (argp_parse(&parser, argc, argv, 0, NULL, &arguments) != 0) {
         return EXIT_USAGE;
     }
+    const char *const output[] = {arguments.json, arguments.html, arguments.calibration_out};
+    const int writable = cli_check_outputs(output, sizeof output / sizeof output[0]);
+    if (writable != EXIT_OK) {
+        return writable;
+    }
     const char *path = bus_table_path(arguments.table, found);
     if (!gap_data_read(&data, arguments.logs, arguments.count, error, sizeof error)) {
         return program_fail(EXIT_BAD_INPUT, "%s", error);

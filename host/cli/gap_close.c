@@ -294,11 +294,15 @@ int gap_close_run(int argc, char **argv) {
     if (argp_parse(&parser, argc, argv, 0, NULL, &arguments) != 0) {
         return EXIT_USAGE;
     }
+    int code = cli_check_outputs(&arguments.json, 1);
+    if (code != EXIT_OK) {
+        return code;
+    }
     if (!close_recording_read(&recording, arguments.log, error, sizeof error)) {
         return program_fail(EXIT_BAD_INPUT, "%s", error);
     }
     const char *path = bus_table_path(arguments.table, found);
-    int code = table_file_open(&file, path, NULL);
+    code = table_file_open(&file, path, NULL);
     if (code == EXIT_OK) {
         code = check_and_follow(&arguments, &recording, path, &file.table);
         table_file_close(&file);

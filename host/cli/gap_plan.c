@@ -248,9 +248,11 @@ int gap_plan_run(int argc, char **argv) {
     if (argp_parse(&parser, argc, argv, 0, NULL, &arguments) != 0) {
         return EXIT_USAGE;
     }
+    const char *const output[] = {arguments.output, arguments.json};
     int code = table_file_open(&file, bus_table_path(arguments.table, found), arguments.module);
     if (code == EXIT_OK) {
-        code = run_on_table(&arguments, &file.table);
+        code = cli_check_outputs(output, sizeof output / sizeof output[0]);
+        code = code != EXIT_OK ? code : run_on_table(&arguments, &file.table);
         table_file_close(&file);
     }
     return code;

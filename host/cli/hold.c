@@ -4,6 +4,7 @@
 #include <string.h>
 
 #include "cli/commands.h"
+#include "cli/report_json.h"
 
 #define WITHIN_US 1000000
 #define WORDS_BYTES 512
@@ -15,6 +16,14 @@ static const char usage[] =
 
 static bool moves(enum supervisor_state state) {
     return state == SUPERVISOR_ACTIVE || state == SUPERVISOR_HOLD;
+}
+
+/* With --json on the side, for the object comes at the end. */
+static void say_held(const struct bus_options *options, const struct link_report *report) {
+    fprintf(options->json ? stderr : stdout, "holding   %.3f %.3f %.3f kPa; Ctrl-C vents\n",
+            1e-3 * (double)report->pressure_pa[0], 1e-3 * (double)report->pressure_pa[1],
+            1e-3 * (double)report->pressure_pa[2]);
+    (void)fflush(stdout);
 }
 
 /* Until it is over or cannot be; an exit code. */
@@ -33,9 +42,7 @@ static int hold(struct bus *bus, const struct bus_options *options, struct link_
         }
         if (!held && report->status.state == SUPERVISOR_HOLD) {
             held = true;
-            printf("holding   %.3f %.3f %.3f kPa; Ctrl-C vents\n", 1e-3 * (double)report->pressure_pa[0],
-                   1e-3 * (double)report->pressure_pa[1], 1e-3 * (double)report->pressure_pa[2]);
-            (void)fflush(stdout);
+            say_held(options, report);
         }
         if (!moves(report->status.state) || (!held && report->time_us > start_us + WITHIN_US)) {
             return program_fail(EXIT_REFUSED, "the controller is in %s and does not hold",
@@ -58,12 +65,17 @@ static int run(struct bus *bus, void *input) {
     }
     program_catch_interrupt();
     const int code = hold(bus, options, &report);
+    const struct link_report held = report;
     (void)bus->link.send(bus->link.context, &vent);
     while (code != EXIT_BUS && moves(report.status.state) && bus->link.receive(bus->link.context, &report)) {
     }
-    if (code == EXIT_OK || code == EXIT_INTERRUPTED) {
-        printf("venting   state %s\n", supervisor_state_name(report.status.state));
+    if (code != EXIT_OK && code != EXIT_INTERRUPTED) {
+        return code;
     }
+    if (options->json) {
+        return report_json_print(report_json(bus, &held)) == EXIT_OK ? code : EXIT_OUTPUT;
+    }
+    printf("venting   state %s\n", supervisor_state_name(report.status.state));
     return code;
 }
 

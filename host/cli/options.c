@@ -5,6 +5,7 @@
 #include <string.h>
 
 #include "cli/commands.h"
+#include "program/output_file.h"
 #include "units/units.h"
 
 #define REFERENCE_TABLE "tables/paper-semicircle.tbt"
@@ -48,6 +49,16 @@ int cli_whole_number(struct argp_state *state, const char *option, const char *t
         return least;
     }
     return (int)number;
+}
+
+int cli_check_outputs(const char *const *path, size_t count) {
+    char error[PROGRAM_ERROR_BYTES];
+    for (size_t i = 0; i < count; i++) {
+        if (path[i] != NULL && !output_file_can_write(path[i], error, sizeof error)) {
+            return program_fail(EXIT_OUTPUT, "%s", error);
+        }
+    }
+    return EXIT_OK;
 }
 
 int cli_threads(struct argp_state *state, const char *text) {
@@ -197,7 +208,7 @@ static int calibrate_controller(struct bus *bus, const struct bus_options *optio
     setup->controller_table = &bus->controller.table.table;
     setup->controller = bus->controller.parameters;
     for (size_t i = 0; i < bus->controller.notes; i++) {
-        printf("note      %s\n", bus->controller.note[i]);
+        fprintf(stderr, "note      %s\n", bus->controller.note[i]);
     }
     return EXIT_OK;
 }
@@ -276,6 +287,9 @@ static error_t parse_alone(int key, char *argument, struct argp_state *state) {
     case ARGP_KEY_INIT:
         state->child_inputs[0] = alone->options;
         return 0;
+    case 'j':
+        alone->options->json = true;
+        return 0;
     case ARGP_KEY_ARG:
         argp_error(state, "%s takes no argument, '%s' is too much", alone->name, argument);
         return 0;
@@ -286,7 +300,8 @@ static error_t parse_alone(int key, char *argument, struct argp_state *state) {
 
 int bus_parse_alone(const char *name, const char *usage, int argc, char **argv, struct bus_options *options) {
     const struct argp_child children[] = {{&bus_options_parser, 0, NULL, 1}, {0}};
-    const struct argp parser = {NULL, parse_alone, "", usage, children, NULL, NULL};
+    const struct argp_option option[] = {{"json", 'j', NULL, 0, "for programs: one JSON object", 0}, {0}};
+    const struct argp parser = {option, parse_alone, "", usage, children, NULL, NULL};
     struct alone alone = {name, options};
     argp_err_exit_status = EXIT_USAGE;
     return argp_parse(&parser, argc, argv, 0, NULL, &alone) == 0 ? EXIT_OK : EXIT_USAGE;

@@ -9,13 +9,18 @@ struct arguments {
     double pressure_pa[3];
 };
 
-static const struct argp_option options[] = {{0}};
+static const struct argp_option options[] = {
+    {"json", 'j', NULL, 0, "for programs: one JSON object, in place of the words", 0},
+    {0}};
 
 static error_t parse(int key, char *argument, struct argp_state *state) {
     struct arguments *arguments = state->input;
     switch (key) {
     case ARGP_KEY_INIT:
         state->child_inputs[0] = &arguments->bus;
+        return 0;
+    case 'j':
+        arguments->bus.json = true;
         return 0;
     case ARGP_KEY_ARG:
         if (state->arg_num > 2) {

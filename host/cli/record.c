@@ -118,10 +118,7 @@ static int print_json(struct bus *bus, const struct bus_options *bus_options,
     json_t *object = report_json(bus, report);
     (void)json_object_set_new(object, "rows", json_integer((json_int_t)rows));
     (void)json_object_set_new(object, "wrote", json_string(bus_options->record));
-    const int failed = json_dumpf(object, stdout, JSON_INDENT(2) | JSON_REAL_PRECISION(9));
-    json_decref(object);
-    printf("\n");
-    return failed == 0 ? EXIT_OK : program_fail(EXIT_OUTPUT, "cannot write to standard output");
+    return report_json_print(object);
 }
 
 static int record(struct bus *bus, void *input) {

@@ -5,6 +5,7 @@
 #include <string.h>
 
 #include "cli/commands.h"
+#include "cli/report_json.h"
 #include "cli/run_course.h"
 #include "comms/node.h"
 #include "log/run_log.h"
@@ -72,7 +73,7 @@ static bool receive(struct run *run, struct link_report *report) {
 
 static void show_progress(struct run *run, const struct link_report *report) {
     const struct controller_status *status = &report->status;
-    if (run->options->quiet || report->time_us < run->next_progress_us) {
+    if (run->options->quiet || run->options->json || report->time_us < run->next_progress_us) {
         return;
     }
     run->next_progress_us = report->time_us + PROGRESS_US;
@@ -248,6 +249,28 @@ static int explain_fault(const struct link_report *report) {
     return EXIT_FAULT;
 }
 
+/* In words; an exit code. */
+static int sum_up(const struct run *run, const struct run_course *course, const struct link_report *last, int code) {
+    if (code == EXIT_FAULT) {
+        return explain_fault(last);
+    }
+    if (!run->options->json && (code == EXIT_OK || code == EXIT_INTERRUPTED)) {
+        if (course->steady != NULL) {
+            print_followed(&run->summary);
+        }
+        print_health(last);
+    }
+    return code;
+}
+
+static int print_json(struct run *run, const struct run_course *course, struct run_outcome *outcome, int code) {
+    outcome->summary = &run->summary;
+    outcome->plan = course->plan;
+    outcome->record = run->options->record;
+    outcome->interrupted = code == EXIT_INTERRUPTED;
+    return report_json_print(run_outcome_json(run->bus, outcome)) == EXIT_OK ? code : EXIT_OUTPUT;
+}
+
 static int run_on_bus(struct run *run, const struct run_course *course) {
     const struct controller_command vent_command = {.kind = COMMAND_VENT};
     struct link_report report;
@@ -264,8 +287,8 @@ static int run_on_bus(struct run *run, const struct run_course *course) {
         return code;
     }
     if (code == EXIT_INTERRUPTED) {
-        printf("interrupted at %.2f s: %s\n", 1e-6 * (double)report.time_us,
-               run->options->hold_on_interrupt ? "holding, Ctrl-C again vents" : "venting");
+        fprintf(run->options->json ? stderr : stdout, "interrupted at %.2f s: %s\n", 1e-6 * (double)report.time_us,
+                run->options->hold_on_interrupt ? "holding, Ctrl-C again vents" : "venting");
         (void)fflush(stdout);
     }
     if (code == EXIT_INTERRUPTED && run->options->hold_on_interrupt) {
@@ -274,17 +297,17 @@ static int run_on_bus(struct run *run, const struct run_course *course) {
     struct link_report last = report;
     const int64_t vent_us = report.time_us;
     const bool vented = vent(run, &report);
-    if (code == EXIT_FAULT) {
-        code = explain_fault(&last);
-    } else if (code == EXIT_OK || code == EXIT_INTERRUPTED) {
-        if (course->steady != NULL) {
-            print_followed(&run->summary);
-        }
-        print_health(&last);
+    const double vented_s = 1e-6 * (double)(report.time_us - vent_us);
+    code = sum_up(run, course, &last, code);
+    if (run->options->json) {
+        struct run_outcome outcome = {.last = &last,
+                                      .followed_s = 1e-6 * (double)(vent_us - run->summary.start_us),
+                                      .vented_s = vented ? vented_s : -1.0};
+        code = print_json(run, course, &outcome, code);
+    } else if (vented) {
+        printf("vented    in %.2f s\n", vented_s);
     }
-    if (vented) {
-        printf("vented    in %.2f s\n", 1e-6 * (double)(report.time_us - vent_us));
-    } else {
+    if (!vented) {
         (void)program_fail(EXIT_FAULT, "the chambers did not vent: %.0f, %.0f, %.0f Pa left",
                            (double)report.pressure_pa[0], (double)report.pressure_pa[1],
                            (double)report.pressure_pa[2]);
@@ -308,13 +331,15 @@ int run_course(const struct bus_options *options, const struct run_course *cours
         bus_close(&bus);
         return program_fail(EXIT_OUTPUT, "%s", error);
     }
-    printf("module    %s, table %s\n", bus.module_name, bus.table_path);
+    if (!options->json) {
+        printf("module    %s, table %s\n", bus.module_name, bus.table_path);
+    }
     program_catch_interrupt();
     struct run run = {.options = options, .bus = &bus, .log = options->record != NULL ? &log : NULL};
     code = run_on_bus(&run, course);
     if (options->record != NULL && !run_log_finish(&log, error, sizeof error)) {
         code = program_fail(EXIT_OUTPUT, "%s", error);
-    } else if (options->record != NULL) {
+    } else if (options->record != NULL && !options->json) {
         printf("wrote     %s\n", options->record);
     }
     bus_close(&bus);

@@ -10,6 +10,7 @@ struct run_course {
     void (*command_at)(const void *context, double since_s, struct controller_command *command);
     const struct controller_command
         *steady;      /* where it is one command all the time: how well it was followed is summed up */
+    const char *plan; /* its file; NULL where there is none */
     const char *note; /* stands before what the log's note says of the bus */
 };
 

@@ -18,6 +18,9 @@ static error_t parse(int key, char *argument, struct argp_state *state) {
     case ARGP_KEY_INIT:
         state->child_inputs[0] = &arguments->bus;
         return 0;
+    case 'j':
+        arguments->bus.json = true;
+        return 0;
     case ARGP_KEY_ARG:
         if (state->arg_num > 0) {
             argp_error(state, "one plan at a time, '%s' is too much", argument);
@@ -36,7 +39,9 @@ static error_t parse(int key, char *argument, struct argp_state *state) {
     }
 }
 
-static const struct argp_option options[] = {{0}};
+static const struct argp_option options[] = {
+    {"json", 'j', NULL, 0, "for programs: one JSON object, in place of the words", 0},
+    {0}};
 static const struct argp_child children[] = {{&bus_options_parser, 0, NULL, 1}, {0}};
 static const struct argp parser = {options,
                                    parse,
@@ -81,8 +86,11 @@ int cli_run(int argc, char **argv) {
     }
     arguments.bus.duration_s = plan_length_s(&plan);
     (void)snprintf(note, sizeof note, "plan %.200s, ", arguments.plan);
-    printf("plan      %zu steps, %.4g s%s%s\n", plan.steps, arguments.bus.duration_s,
-           *plan.note != '\0' ? ": " : "", plan.note);
-    const struct run_course course = {.context = &plan, .command_at = command_at, .note = note};
+    if (!arguments.bus.json) {
+        printf("plan      %zu steps, %.4g s%s%s\n", plan.steps, arguments.bus.duration_s,
+               *plan.note != '\0' ? ": " : "", plan.note);
+    }
+    const struct run_course course = {
+        .context = &plan, .command_at = command_at, .plan = arguments.plan, .note = note};
     return run_course(&arguments.bus, &course);
 }

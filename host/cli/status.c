@@ -104,11 +104,7 @@ static void print_status(struct bus *bus, const struct bus_options *bus_options,
 }
 
 static int print_json(struct bus *bus, const struct link_report *report) {
-    json_t *object = report_json(bus, report);
-    const int failed = json_dumpf(object, stdout, JSON_INDENT(2) | JSON_REAL_PRECISION(9));
-    json_decref(object);
-    printf("\n");
-    return failed == 0 ? EXIT_OK : program_fail(EXIT_OUTPUT, "cannot write to standard output");
+    return report_json_print(report_json(bus, report));
 }
 
 /* Until the time is over; an exit code. */

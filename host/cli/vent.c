@@ -4,6 +4,7 @@
 #include <string.h>
 
 #include "cli/commands.h"
+#include "cli/report_json.h"
 
 #define VENT_WITHIN_US 10000000
 #define VENTED_PA 500.0f
@@ -15,6 +16,17 @@ static bool is_vented(const struct link_report *report) {
     const float *pressure_pa = report->status.pressure_estimate_pa;
     return pressure_pa[0] < VENTED_PA && pressure_pa[1] < VENTED_PA && pressure_pa[2] < VENTED_PA &&
            report->status.state != SUPERVISOR_ACTIVE && report->status.state != SUPERVISOR_HOLD;
+}
+
+static int say_vented(struct bus *bus, const struct bus_options *options, const struct link_report *report,
+                      double vented_s) {
+    if (options->json) {
+        json_t *object = report_json(bus, report);
+        (void)json_object_set_new(object, "vented_s", json_real(vented_s));
+        return report_json_print(object);
+    }
+    printf("vented    in %.2f s, state %s\n", vented_s, supervisor_state_name(report->status.state));
+    return EXIT_OK;
 }
 
 static int vent(struct bus *bus, void *input) {
@@ -29,9 +41,7 @@ static int vent(struct bus *bus, void *input) {
         }
         start_us = start_us < 0 ? report.time_us : start_us;
         if (is_vented(&report)) {
-            printf("vented    in %.2f s, state %s\n", 1e-6 * (double)(report.time_us - start_us),
-                   supervisor_state_name(report.status.state));
-            return EXIT_OK;
+            return say_vented(bus, options, &report, 1e-6 * (double)(report.time_us - start_us));
         }
     } while (report.time_us < start_us + VENT_WITHIN_US);
     return program_fail(

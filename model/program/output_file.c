@@ -21,6 +21,15 @@ bool output_file_open(struct output_file *file, const char *path, char *error, s
     return true;
 }
 
+bool output_file_can_write(const char *path, char *error, size_t error_bytes) {
+    struct output_file file;
+    if (!output_file_open(&file, path, error, error_bytes)) {
+        return false;
+    }
+    output_file_discard(&file);
+    return true;
+}
+
 bool output_file_commit(struct output_file *file, char *error, size_t error_bytes) {
     bool whole = ferror(file->stream) == 0 && fflush(file->stream) == 0;
     whole = whole && (fsync(fileno(file->stream)) == 0 || errno == EINVAL);

@@ -18,11 +18,7 @@ while read -r command; do
     *" board "* | *" bridge "*)
         $command >"$scratch/said.$commands" 2>&1 &
         started+=($!)
-        for _ in $(seq 100); do
-            ! grep -qE 'state: SAFE|is heard' "$scratch/said.$commands" || break
-            sleep 0.1
-        done
-        grep -qE 'state: SAFE|is heard' "$scratch/said.$commands"
+        until_true grep -qE 'state: SAFE|is heard' "$scratch/said.$commands"
         ;;
     *) timeout 300 $command >"$scratch/said" 2>&1 </dev/null ;;
     esac

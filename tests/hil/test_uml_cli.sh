@@ -5,4 +5,4 @@ build=${TRIBEND_BUILD:-build}
 scratch=$(mktemp -d)
 trap 'rm -rf "$scratch"' EXIT
 "$build/tribend-tables" build paper-semicircle --nodes 4 --mesh-size 1.5mm -q -o "$scratch/small.tbt" >/dev/null || exit 1
-tests/hil/uml/boot tests/hil/uml/cli.sh 240 "SMALL_TABLE=$scratch/small.tbt"
+tests/hil/uml/boot tests/hil/uml/cli.sh 900 "SMALL_TABLE=$scratch/small.tbt"

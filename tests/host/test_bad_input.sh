@@ -218,7 +218,7 @@ expect drill_on_a_calibrated_controller 6 'FAULT.*corrupt' "$tribend" bend 40deg
 echo "[ RUN      ] interrupted_run"
 "$tribend" bend 40deg --for 1440min --record "$scratch/interrupted.csv" >"$scratch/stdout" 2>&1 &
 pid=$!
-sleep 0.7
+for _ in $(seq 600); do [ ! -s "$scratch/interrupted.csv.part" ] || break; sleep 0.1; done
 kill -INT $pid
 wait $pid
 status=$?

@@ -13,12 +13,9 @@ shown="$scratch/said"
 serve() {
     "$tribend" view --port 0 "$@" >"$scratch/said" 2>&1 &
     server=$!
-    for _ in $(seq 200); do
-        address=$(sed -n 's/^view  *//p' "$scratch/said")
-        [ -z "$address" ] || break
-        kill -0 $server 2>/dev/null || break
-        sleep 0.05
-    done
+    has_said_where() { address=$(sed -n 's/^view  *//p' "$scratch/said") && [ -n "$address" ] || ! kill -0 $server 2>/dev/null; }
+    until_true has_said_where
+    [ -n "$address" ] || { check view_starts 1; exit 1; }
     token=${address##*token=} address=${address%%#*}
     [ "$token" != "$address" ] || token=$(curl -s "${address}session" | sed 's/.*:"//; s/".*//')
 }
@@ -32,14 +29,14 @@ stop() {
 refuses() {
     local name=$1 status=$2 pattern=$3
     shift 3
-    curl -s -m 20 -o "$scratch/body" -w '%{http_code}' "$@" >"$scratch/status"
+    curl -sS -m 120 -o "$scratch/body" -w '%{http_code}' "$@" >"$scratch/status"
     [ "$(cat "$scratch/status")" = "$status" ] && grep -qE "\"error\":\".*$pattern" "$scratch/body"
     local result=$?
     [ $result = 0 ] || echo "$(cat "$scratch/status") $(cat "$scratch/body")"
     check "$name" $result
 }
 
-serve --lease 6s --for 300s
+serve --lease 10s --for 60min
 post=(-H "Authorization: Bearer $token" -d '{"page":"a"}')
 command=(-H "Authorization: Bearer $token" "${address}command" -d)
 refuses no_token_no_data 401 'token is missing or wrong' "${address}module"
@@ -59,24 +56,26 @@ refuses bend_that_is_no_number 400 'bend_deg' "${command[@]}" '{"page":"a","bend
 refuses number_left_out 400 'direction_deg' "${command[@]}" '{"page":"a","bend_deg":10}'
 refuses command_without_arm 409 'not armed' "${command[@]}" '{"page":"a","bend_deg":10,"direction_deg":0,"co_contraction_kpa":0}'
 # a page whose stream ends loses the arm at once, not when its lease runs out
-curl -sN -m 30 "${address}events?page=watcher&token=$token" >"$scratch/watched" 2>/dev/null &
+curl -sN -m 600 "${address}events?page=watcher&token=$token" >"$scratch/watched" 2>/dev/null &
 watcher=$!
-curl -sN -m 30 "${address}events?page=closer&token=$token" >"$scratch/closer" 2>/dev/null &
+curl -sN -m 600 "${address}events?page=closer&token=$token" >"$scratch/closer" 2>/dev/null &
 closer=$!
-for _ in $(seq 200); do [ -s "$scratch/closer" ] && break || sleep 0.05; done
+until_true test -s "$scratch/closer"
+until_true test -s "$scratch/watched"
 curl -s -H "Authorization: Bearer $token" -d '{"page":"closer"}' "${address}arm" >/dev/null
 kill $closer
-for _ in $(seq 200); do tail -n 3 "$scratch/watched" | grep -q 'was closed\|fell silent' && break || sleep 0.05; done
-tail -n 3 "$scratch/watched" | grep -q 'was closed'
+says_why() { grep -q 'was closed\|fell silent' "$scratch/watched"; }
+until_true says_why
+grep -q 'was closed' "$scratch/watched" && ! grep -q 'fell silent' "$scratch/watched"
 check closed_stream_takes_the_arm_away $?
 kill $watcher
 for page in 1 2 3 4 5 6 7 8; do
     # 503 is tried again: the server notices a closed stream when it next writes
-    curl -sN -m 60 --retry 30 --retry-delay 1 "${address}events?page=$page&token=$token" >"$scratch/stream$page" 2>/dev/null &
+    curl -sN -m 600 --retry 120 --retry-delay 1 "${address}events?page=$page&token=$token" >"$scratch/stream$page" 2>/dev/null &
     streams="$streams $!"
 done
 for page in 1 2 3 4 5 6 7 8; do
-    for _ in $(seq 200); do grep -q data: "$scratch/stream$page" && break || sleep 0.05; done
+    until_true grep -q data: "$scratch/stream$page"
 done
 refuses ninth_page 503 'too many pages' "${address}events?page=9&token=$token"
 # shellcheck disable=SC2086
@@ -94,7 +93,7 @@ stop
 check interrupted_it_vents $?
 
 # beyond this machine
-serve --listen 0.0.0.0 --for 60s
+serve --listen 0.0.0.0 --for 60min
 refuses from_elsewhere_no_token_is_given_away 403 'token' "${address}session"
 curl -s -H "Authorization: Bearer $token" "${address}module" | grep -q '"module":"paper-semicircle"'
 check from_elsewhere_the_printed_token_opens $?
@@ -105,10 +104,11 @@ chmod 644 "$scratch/token"
 [ $? = 3 ] && grep -q 'chmod 600' "$scratch/said"
 check token_file_that_others_may_read $?
 chmod 600 "$scratch/token"
-serve --token-file "$scratch/token" --for 60s --record "$scratch/run.csv"
+serve --token-file "$scratch/token" --for 60min --record "$scratch/run.csv"
 curl -s -H "Authorization: Bearer 0123456789abcdefghij" "${address}module" | grep -q '"bus":"sim"'
 check token_file_opens $?
-sleep 1 # of motion to draw
+has_rows() { [ "$(wc -l <"$scratch/run.csv.part")" -gt 1000 ]; } # a second of motion to draw
+until_true has_rows
 stop
 "$tribend" plot "$scratch/run.csv" -o "$scratch/run.png" >/dev/null 2>&1
 check recorded_run_can_be_drawn $?

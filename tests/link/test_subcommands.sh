@@ -15,7 +15,7 @@ plainly=()
 gives() {
     local code=$1 pattern=$2
     shift 2
-    timeout 20 "${plainly[@]}" "$tribend" "$@" >/dev/null 2>"$scratch/said" </dev/null
+    timeout 120 "${plainly[@]}" "$tribend" "$@" >/dev/null 2>"$scratch/said" </dev/null
     local status=$?
     [ "$status" -eq "$code" ] && grep -qE -- "$pattern" "$scratch/said" && return
     echo "exit code $status, wanted $code and /$pattern/: tribend $*" >>"$scratch/said"
@@ -27,6 +27,7 @@ printf 'module: paper-semicircle\nsteps:\n  - {for: 1s, pressure: [0mbar, 0mbar,
 "$tribend" bend 10deg --for 1s -q --record "$scratch/run.csv" >/dev/null
 "$tribend" dbc -o "$scratch/board.dbc" && printf '111#F401F401F4010000\n' >"$scratch/frames" &&
     printf '(1.000000) can0 111#F401F401F4010000\n(1.005000) can0 111#F501F401F4010500\n' >"$scratch/candump"
+printf 'module: paper-semicircle\nstiffness_scale: { value: 0.9 }\nsupply_scale: { value: 1 }\neffects: []\n' >"$scratch/soft.yaml"
 chmod 000 "$scratch/secret" "$scratch/closed"
 
 # how each is called when all is well; of those that talk to a board, with no bus yet
@@ -50,22 +51,17 @@ declare -A writes=(
     [run]="$scratch/plan.yaml --record $scratch/closed/f" [plot]="$scratch/run.csv -o $scratch/closed/f" [dbc]="-o $scratch/closed/f"
     [import]="$scratch/candump --candump -o $scratch/closed/f" [record]="-o $scratch/closed/f --for 0.1s"
     [bridge]="--bus unix:$scratch/bus --can-log $scratch/closed/f --for 0.1s" [board]="--for 0.1s --record $scratch/closed/f"
-    [params]="backup $scratch/closed/f --bus unix:$scratch/bus" ["gap diagnose"]="-q $scratch/run.csv --json $scratch/closed/f")
+    [params]="backup $scratch/closed/f --bus unix:$scratch/bus" ["gap diagnose"]="-q $scratch/run.csv --json $scratch/closed/f"
+    ["gap plan"]="--group line_volume,line_resistance -o $scratch/closed/f" ["gap close"]="$scratch/run.csv --calibration $scratch/soft.yaml --json $scratch/closed/f")
 
 "$build/tests/link/stub/board_stub" "$scratch/bus" >"$scratch/states" 2>&1 &
 stub=$!
-for _ in $(seq 100); do
-    ! grep -q SAFE "$scratch/states" || break
-    sleep 0.02
-done
+until_true grep -q SAFE "$scratch/states"
 : >"$scratch/none"
 : >"$scratch/locked" && chmod 000 "$scratch/locked"
 "$build/tests/link/stub/board_stub" "$scratch/locked_bus" >/dev/null 2>&1 &
 locked=$!
-for _ in $(seq 100); do
-    [ ! -e "$scratch/locked_bus" ] || break
-    sleep 0.02
-done
+until_true test -e "$scratch/locked_bus"
 chmod 000 "$scratch/locked_bus"
 
 listed() { "$tribend" "$@" 2>&1 | sed -n 's/^  \([a-z]*\)  .*/\1/p'; }
@@ -114,5 +110,17 @@ for one in "${!writes[@]}"; do
     gives 5 'closed/f.*[Pp]ermission denied' $one ${writes[$one]}
     check "${one/ /_}_names_a_folder_that_it_may_not_write" $?
 done
+# said before the work, which takes several seconds of processor time
+long_works=("gap plan --group line_volume,line_resistance -q -o $scratch/closed/f"
+    "gap plan --group line_volume,line_resistance -q -o $scratch/new.yaml --json $scratch/closed/f"
+    "gap diagnose -q $scratch/long.csv --html $scratch/closed/f" "gap diagnose -q $scratch/long.csv --calibration-out $scratch/closed/f")
+"$tribend" bend 60deg --for 20s -q --effect line_volume --record "$scratch/long.csv" >/dev/null
+for work in "${long_works[@]}"; do
+    # shellcheck disable=SC2086
+    (ulimit -t 1 && gives 5 'closed/f.*[Pp]ermission denied' $work)
+    check "output_is_tried_first_$(sed 's#[^a-z ]##g; s/  */_/g' <<<"${work%% $scratch*}${work##*$scratch}")" $?
+done
+[ ! -e "$scratch/new.yaml" ] && [ ! -e "$scratch/new.yaml.part" ]
+check nothing_is_left_of_a_work_that_was_not_begun $?
 kill "$locked"
 check_end

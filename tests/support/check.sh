@@ -13,6 +13,15 @@ check() { # name, condition's status
         failed=$((failed + 1))
     fi
 }
+# until_true COMMAND..: true as soon as the command succeeds; the bound is for what hangs, nothing is timed by it
+until_true() {
+    local end=$((SECONDS + 60))
+    until "$@"; do
+        [ "$SECONDS" -lt "$end" ] || return 1
+        short_pause
+    done
+}
+short_pause() { sleep 0.05; }
 # The closing line; false where a check failed.
 check_end() {
     echo "[  PASSED  ] $passed test(s)."
