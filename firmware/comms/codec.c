@@ -28,6 +28,8 @@
      MEMBER_BYTES(message, field),                                                                           \
      NEAREST(STEPS(least, scale, offset)),                                                                   \
      NEAREST(STEPS(most, scale, offset)),                                                                    \
+     (float)NEAREST(STEPS(least, scale, offset)) - 1.0f,                                                     \
+     (float)NEAREST(STEPS(most, scale, offset)) + 1.0f,                                                      \
      scale,                                                                                                  \
      offset},
 #define WHOLE(message, field, start, bits, type, unit, values, comment)                                      \
@@ -40,6 +42,8 @@
      MEMBER_BYTES(message, field),                                                                           \
      0,                                                                                                      \
      0,                                                                                                      \
+     0.0f,                                                                                                   \
+     0.0f,                                                                                                   \
      1.0f,                                                                                                   \
      0.0f},
 static const struct message_field fields[] = {
@@ -112,7 +116,6 @@ _Static_assert(__BYTE_ORDER__ == __ORDER_LITTLE_ENDIAN__,
 
 #define WORD_BITS 32u
 #define WORD_BYTES 4u
-#define WORDS (HAL_CAN_DATA_BYTES / WORD_BYTES)
 
 static uint32_t low_bits(uint32_t bits) {
     return bits < WORD_BITS ? (1u << bits) - 1u : UINT32_MAX;
@@ -147,7 +150,7 @@ static int32_t raw_that_lacks(const struct message_field *field) {
 static int32_t quantise(const struct message_field *field, float value, struct message_trouble *trouble) {
     const float steps = (value - field->offset) / field->scale;
     const float nearest = steps + (steps < 0.0f ? -0.5f : 0.5f);
-    if (nearest > (float)field->least - 1.0f && nearest < (float)field->most + 1.0f) {
+    if (nearest > field->under && nearest < field->over) {
         return (int32_t)nearest; /* which cuts towards zero: past an end by less than one is that end */
     }
     if (!real_is_finite(value) && !(value < 0.0f) && !(value > 0.0f)) { /* NaN */
@@ -239,31 +242,54 @@ static void unpack_real(const struct message_field *field, uint32_t raw, uint8_t
 
 /* --- messages */
 
-void message_pack(enum message_id id, const void *message, uint8_t *data, struct message_trouble *trouble) {
-    const struct message_row *row = &rows[id];
-    const struct message_field *field = &fields[row->first_field], *end = field + row->fields;
-    const uint8_t *members = message;
-    uint32_t words[WORDS];
-    for (uint32_t w = 0; w * WORD_BYTES < row->bytes; w++) {
-        words[w] = 0u;
+void message_pack_begin(enum message_id id, struct message_packing *packing) {
+    packing->fields = 0u;
+    packing->words[0] = 0u;
+    packing->words[1] = 0u;
+    if (rows[id].bytes > CLASSIC_BYTES) {
+        (void)memset(packing->words, 0, sizeof packing->words);
     }
+}
+
+bool message_pack_some(enum message_id id, const void *message, uint32_t most, struct message_packing *packing,
+                       struct message_trouble *trouble) {
+    const uint32_t left = rows[id].fields - packing->fields, count = left < most ? left : most;
+    const struct message_field *field = &fields[rows[id].first_field + packing->fields], *end = field + count;
+    const uint8_t *members = message;
     for (; field < end; field++) {
         if (field->kind == MESSAGE_FIELD_REAL) {
-            pack_real(field, members + field->at, words, trouble);
+            pack_real(field, members + field->at, packing->words, trouble);
         } else if (field->bits <= WORD_BITS) {
-            pack_whole(field, members + field->at, words, trouble);
+            pack_whole(field, members + field->at, packing->words, trouble);
         } else {
-            pack_wide(field, members + field->at, words, trouble);
+            pack_wide(field, members + field->at, packing->words, trouble);
         }
     }
-    (void)memcpy(data, words, row->bytes);
+    packing->fields += count;
+    return count == left;
+}
+
+void message_pack_end(enum message_id id, const struct message_packing *packing, uint32_t node,
+                      struct hal_can_frame *frame) {
+    frame->id = message_identifier(id, node);
+    frame->extended = false;
+    frame->fd = rows[id].bytes > CLASSIC_BYTES;
+    frame->length = rows[id].bytes;
+    (void)memcpy(frame->data, packing->words, rows[id].bytes);
+}
+
+void message_pack(enum message_id id, const void *message, uint8_t *data, struct message_trouble *trouble) {
+    struct message_packing packing;
+    message_pack_begin(id, &packing);
+    (void)message_pack_some(id, message, rows[id].fields, &packing, trouble);
+    (void)memcpy(data, packing.words, rows[id].bytes);
 }
 
 void message_unpack(enum message_id id, const uint8_t *data, void *message, struct message_trouble *trouble) {
     const struct message_row *row = &rows[id];
     const struct message_field *field = &fields[row->first_field], *end = field + row->fields;
     uint8_t *members = message;
-    uint32_t words[WORDS];
+    uint32_t words[MESSAGE_WORDS];
     words[(row->bytes - 1u) / WORD_BYTES] = 0u; /* the last may not be full */
     (void)memcpy(words, data, row->bytes);
     for (; field < end; field++) {
@@ -277,9 +303,8 @@ void message_unpack(enum message_id id, const uint8_t *data, void *message, stru
 
 void message_frame(enum message_id id, uint32_t node, const void *message, struct hal_can_frame *frame,
                    struct message_trouble *trouble) {
-    frame->id = message_identifier(id, node);
-    frame->extended = false;
-    frame->fd = rows[id].bytes > CLASSIC_BYTES;
-    frame->length = rows[id].bytes;
-    message_pack(id, message, frame->data, trouble);
+    struct message_packing packing;
+    message_pack_begin(id, &packing);
+    (void)message_pack_some(id, message, rows[id].fields, &packing, trouble);
+    message_pack_end(id, &packing, node, frame);
 }

@@ -19,6 +19,7 @@
 #define MESSAGE_CLEAR_KEY 0xC1EAu
 #define MESSAGE_RESET_KEY 0x5E7Au
 #define MESSAGE_CHUNK_BYTES 7u
+#define MESSAGE_WORDS (HAL_CAN_DATA_BYTES / 4u)
 
 enum message_id {
 #define MESSAGE(NAME, name, number, direction, bytes, period_ms, phase_ms, comment) MESSAGE_##NAME,
@@ -68,8 +69,10 @@ struct message_field {
     bool may_lack;
     uint8_t at;    /* of its member in the struct, bytes */
     uint8_t width; /* of its member, bytes */
-    int32_t least; /* raw, of REAL */
+    int32_t least; /* raw, of REAL, */
     int32_t most;
+    float under; /* and by one beyond them */
+    float over;
     float scale;
     float offset;
 };
@@ -78,6 +81,12 @@ struct message_field {
 struct message_trouble {
     uint32_t out_of_range; /* numbers that were saturated, or lie outside the table's range */
     uint32_t lacking;      /* fields without a value */
+};
+
+/* A message on its way into a frame. */
+struct message_packing {
+    uint32_t fields; /* that are packed */
+    uint32_t words[MESSAGE_WORDS];
 };
 
 const struct message_row *message_row(enum message_id id);
@@ -92,6 +101,12 @@ void message_pack(enum message_id id, const void *message, uint8_t *data, struct
 /* The reverse, from the message's bytes; REAL fields that lack a value become NaN, those out of range are
  * given as they are. Adds to `trouble`. */
 void message_unpack(enum message_id id, const uint8_t *data, void *message, struct message_trouble *trouble);
+/* A long one in parts: `most` fields at a time, until it returns true. */
+void message_pack_begin(enum message_id id, struct message_packing *packing);
+bool message_pack_some(enum message_id id, const void *message, uint32_t most, struct message_packing *packing,
+                       struct message_trouble *trouble);
+void message_pack_end(enum message_id id, const struct message_packing *packing, uint32_t node,
+                      struct hal_can_frame *frame);
 /* A whole frame to `node`. FD where the message is longer than 8 bytes. */
 void message_frame(enum message_id id, uint32_t node, const void *message, struct hal_can_frame *frame,
                    struct message_trouble *trouble);

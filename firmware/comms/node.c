@@ -15,6 +15,7 @@
 #define NAME_PIECE_BYTES 7u
 #define TIP_TIME_SHIFT 6u /* units of 64 us */
 #define AGE_MOST 0x7fffffffu
+#define FIELDS_A_STEP 11u /* a third of TELEMETRY's */
 
 _Static_assert((uint32_t)FAULT_COUNT <= 32u, "STATUS.faults has 32 bits");
 _Static_assert((uint32_t)WARNING_COUNT <= 16u, "STATUS.warnings has 16 bits");
@@ -348,7 +349,7 @@ enum report_index {
     REPORT_COUNT
 };
 _Static_assert((uint32_t)REPORT_COUNT == NODE_REPORT_COUNT && NODE_REPORT_COUNT <= 32u,
-               "a bit and a countdown each");
+               "a bit and a count of turns each");
 
 static const struct report reports[REPORT_COUNT] = {
     [REPORT_STATUS] = {MESSAGE_STATUS, false, fill_status},
@@ -428,15 +429,31 @@ static void note_refusal(struct node *node) {
     node->refused_before = refused;
 }
 
-static void count_down(struct node *node) {
+#define MESSAGE(NAME, name, number, direction, bytes, period_ms, phase_ms, comment)                          \
+    _Static_assert((period_ms) % NODE_TURNS == 0u, #NAME " has its turn every NODE_TURNS steps");
+#include "comms/messages.def"
+
+/* A report can fall due in its turns alone, so that a step looks at few of them. */
+static void set_turns(struct node *node) {
     for (uint32_t r = 0; r < (uint32_t)REPORT_COUNT; r++) {
-        if (node->countdown[r] == 0u) {
-            continue; /* has no period */
+        const struct message_row *row = message_row(reports[r].id);
+        if (row->period_ms > 0u) {
+            node->in_turn[row->phase_ms % NODE_TURNS] |= 1u << r;
+            node->turns_left[r] = row->phase_ms / NODE_TURNS + 1u;
         }
-        node->countdown[r]--;
-        if (node->countdown[r] == 0u) {
-            node->countdown[r] =
-                (uint32_t)message_row(reports[r].id)->period_ms * node->parameters.node.telemetry_slowdown;
+    }
+}
+
+static void count_down(struct node *node) {
+    uint32_t in_turn = node->in_turn[node->turn];
+    node->turn = node->turn + 1u < NODE_TURNS ? node->turn + 1u : 0u;
+    while (in_turn != 0u) {
+        const uint32_t r = (uint32_t)__builtin_ctz(in_turn);
+        in_turn &= in_turn - 1u;
+        node->turns_left[r]--;
+        if (node->turns_left[r] == 0u) {
+            const uint32_t period_ms = message_row(reports[r].id)->period_ms;
+            node->turns_left[r] = period_ms / NODE_TURNS * node->parameters.node.telemetry_slowdown;
             fall_due(node, (enum report_index)r);
         }
     }
@@ -487,8 +504,30 @@ static void note_sent(struct node *node, enum report_index report) {
     }
 }
 
+/* Its share of this step; it stays pending until its last part is sent. False: no room on the bus, it begins anew. */
+static bool send_part(struct node *node, enum report_index report) {
+    const struct hal_bus *bus = node->setup->bus;
+    const enum message_id id = reports[report].id;
+    struct node_long_report *part = &node->long_report;
+    struct hal_can_frame frame;
+    if (!part->begun) {
+        reports[report].fill(node, &part->message);
+        message_pack_begin(id, &part->packing);
+    }
+    part->begun = !message_pack_some(id, &part->message, FIELDS_A_STEP, &part->packing, &node->counters.reported);
+    if (part->begun) {
+        return true;
+    }
+    message_pack_end(id, &part->packing, node->node_id, &frame);
+    if (!bus->send(bus->context, &frame)) {
+        return false;
+    }
+    note_sent(node, report);
+    return true;
+}
+
 /* False: no room on the bus; it stays pending. */
-static bool send_report(struct node *node, enum report_index report) {
+static bool send_whole(struct node *node, enum report_index report) {
     const struct hal_bus *bus = node->setup->bus;
     struct hal_can_frame frame;
     union message message;
@@ -507,22 +546,21 @@ static uint32_t next_pending(uint32_t pending, uint32_t from) {
     return (uint32_t)__builtin_ctz(later != 0u ? later : pending);
 }
 
-/* A long frame takes as long to build as two short ones. */
-static uint32_t effort_of(enum report_index report) {
-    return report == REPORT_TELEMETRY ? NODE_REPORTS_A_STEP : 1u;
-}
-
-/* A step that took commands has done its share of work. */
+/* A step that took commands or read the tip sensor has done its share of work; a part of a long frame is a share, too. */
 static void send_reports(struct node *node) {
-    uint32_t sent = node->took_commands ? 1u : 0u;
+    uint32_t sent = node->took_commands || node->app.input.tip_new ? 1u : 0u;
     while (sent < NODE_REPORTS_A_STEP && node->pending != 0u) {
-        const uint32_t report = next_pending(node->pending, node->next_report);
-        node->next_report = report;
-        if (!send_report(node, (enum report_index)report)) {
+        const uint32_t next = next_pending(node->pending, node->next_report);
+        const enum report_index report = (enum report_index)next;
+        const bool is_long = report == REPORT_TELEMETRY;
+        node->next_report = next;
+        if (!(is_long ? send_part(node, report) : send_whole(node, report))) {
             return;
         }
-        sent += effort_of((enum report_index)report);
-        node->next_report = report + 1u < (uint32_t)REPORT_COUNT ? report + 1u : 0u;
+        sent += is_long ? NODE_REPORTS_A_STEP : 1u;
+        if (!node->long_report.begun) {
+            node->next_report = next + 1u < (uint32_t)REPORT_COUNT ? next + 1u : 0u;
+        }
     }
 }
 
@@ -948,10 +986,7 @@ void node_init(struct node *node, const struct node_setup *setup) {
     app_init(&node->app, setup->hal, table_of(node), &node->parameters.controller);
     node->app.parameters_corrupt = store_parameters_lost(&node->store);
     use_parameters(node);
-    for (uint32_t r = 0; r < (uint32_t)REPORT_COUNT; r++) {
-        const struct message_row *row = message_row(reports[r].id);
-        node->countdown[r] = row->period_ms > 0u ? (uint32_t)row->phase_ms + 1u : 0u;
-    }
+    set_turns(node);
     const struct message_tip_position nowhere = {not_a_number(), not_a_number(), not_a_number(), 0u};
     node->tip_position = nowhere;
     const struct message_tip_orientation nohow = {not_a_number(), not_a_number(), not_a_number(),

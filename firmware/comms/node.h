@@ -10,8 +10,8 @@
  *         if (node.reset_wanted) ...       // vent, then reset: a host asked for it while vented
  *
  * Nothing of it blocks, and each step's work is bounded: node_step() and node_report() together take some
- * 1,500 instructions of a Cortex-M4F at most while a host commands and hears, 2,200 with two commands in
- * every step, about 100 more for each foreign frame that the bus hands over, and up to 5,000 for one step of
+ * 1,500 instructions of a Cortex-M4F at most while a host commands and hears, 2,400 with two commands in
+ * every step, about 100 more for each foreign frame that the bus hands over, and up to 9,000 for one step of
  * a table's check, while vented. Commands come in the messages of messages.def; one that is malformed, out of
  * range, of another version, stale or out of place is refused, counted by its reason and reported. VENT is
  * obeyed whatever it holds, and wins over whatever came in the same step. Not here: the bits of messages
@@ -27,7 +27,7 @@
 
 #define NODE_FRAMES_A_STEP 24u  /* more than a 1 Mbit/s bus carries in a step */
 #define NODE_COMMANDS_A_STEP 2u /* of them, those that are for this node; what is left waits */
-#define NODE_REPORTS_A_STEP 2u  /* frames sent; one in a step that took commands, and one of 64 bytes */
+#define NODE_REPORTS_A_STEP 2u  /* frames sent; one in a step that took commands or a tip sample, and a part of one of 64 bytes */
 
 /* Why a command was refused. */
 #define NODE_REFUSALS(X)                                                                                     \
@@ -98,6 +98,14 @@ struct node_counters {
 };
 
 #define NODE_REPORT_COUNT 25u
+#define NODE_TURNS 5u /* steps; every period of messages.def is a multiple of it */
+
+/* One of 64 bytes, which is built in some steps. */
+struct node_long_report {
+    bool begun;
+    union message message;
+    struct message_packing packing;
+};
 
 struct node {
     struct app app;
@@ -123,8 +131,11 @@ struct node {
     uint32_t pending; /* reports to send, a bit each, */
     uint32_t due;     /* and those of them whose period has passed */
     uint32_t next_report;
+    struct node_long_report long_report;
     bool took_commands; /* in this step */
-    uint32_t countdown[NODE_REPORT_COUNT];
+    uint32_t turn;                          /* of this step, */
+    uint32_t in_turn[NODE_TURNS];           /* the reports that can fall due in each, a bit each, */
+    uint32_t turns_left[NODE_REPORT_COUNT]; /* and when they do */
     uint32_t refusal_next; /* reason of the next REFUSALS */
     uint32_t name_piece;
     enum transfer_error begin_error;

@@ -134,16 +134,15 @@ static void take_record(struct tip_stream *stream) {
 
 void tip_stream_byte(struct tip_stream *stream, uint8_t byte, int64_t arrived_us) {
     const bool starts = (byte & PHASING) != 0u;
-    const bool paused = arrived_us - stream->started_us > RECORD_US_MOST;
-    if (stream->count > 0u && (starts || paused)) {
-        stream->counters.short_records++;
+    if (starts || stream->count == 0u || arrived_us - stream->started_us > RECORD_US_MOST) {
+        stream->counters.short_records += stream->count > 0u ? 1u : 0u;
+        stream->counters.bad_phasing += starts ? 0u : 1u;
         stream->count = 0u;
+        if (!starts) {
+            return;
+        }
+        stream->started_us = arrived_us;
     }
-    if (stream->count == 0u && !starts) {
-        stream->counters.bad_phasing++;
-        return;
-    }
-    stream->started_us = starts ? arrived_us : stream->started_us;
     stream->record[stream->count++] = byte;
     if (stream->count == TIP_STREAM_RECORD_BYTES) {
         stream->count = 0u;

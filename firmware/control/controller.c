@@ -6,12 +6,14 @@
  * A step has a bound (tests/bench), so what can wait is spread over steps. Of what looks into the table at length, a step
  * does one: take a tip sample, judge its pose, follow the creep, predict the bend where no sensor tells it, work on the
  * targets, or else renew the chambers' capacities. Valves take a new duty every 10 ms, so a millisecond or two is no loss.
- *   tip         at most every TIP_STEPS, so that the others get their turn; tip sensors give up to 255 samples a second
+ *   tip         a step after it came, since to read it is work, too; at most every TIP_STEPS, so that the others get their
+ *               turn; tip sensors give up to 255 samples a second
  *   inversion   one look at the table a step; what Newton makes of the first is within 0.1 degree of the answer already
  *   capacity    two chambers a step, and one at the latest after CAPACITY_STEPS: in 3 ms of full flow it changes by some 2 %
- *   late valve  its duty is worked out once a period, in one of the last three steps before it: the forecast through the
- *               pulses on their way is long, and only the duty at the period's start counts
- *   table       a part of its CRC-32, a small one but in steps that have only capacities to renew */
+ *   duty        once a period, in the last step before it: only the duty at the period's start counts; a late valve's, whose
+ *               forecast through the pulses on their way is long, in one of the last three, a chamber each
+ *   table       a part of its CRC-32: none in a step that takes a tip sample, nor in one that works out duties and has more
+ *               to do; a large one in a step that has only capacities to renew: no tip sample to read, no duty */
 #include "control/controller.h"
 
 #include <stddef.h>
@@ -27,7 +29,7 @@
 #define TIP_STEPS 3u      /* control steps from one tip sample to the next, at least */
 #define CAPACITY_STEPS 3u /* without a capacity renewed, at most */
 
-enum look { LOOK_ELSEWHERE = 0, LOOK_FOR_TARGETS, LOOK_IDLE };
+enum look { LOOK_ELSEWHERE = 0, LOOK_AT_TIP, LOOK_FOR_TARGETS, LOOK_IDLE };
 
 void controller_default_parameters(struct controller_parameters *parameters, const struct bend_table *table) {
     *parameters = (struct controller_parameters){
@@ -53,6 +55,7 @@ void controller_seal_parameters(struct controller *controller) {
 
 void controller_set_parameters(struct controller *controller, const struct controller_parameters *parameters) {
     controller->parameters = *parameters;
+    controller->period_start_us = 0; /* periods start at multiples of what they now are */
     struct controller_calibration *calibration = &controller->parameters.calibration;
     controller->status.calibration_limited = calibration_limit(calibration);
     calibration_frames_of(calibration, &controller->frames);
@@ -147,6 +150,20 @@ static void follow_creep(struct controller *controller) {
     controller->targets_stale = true;
 }
 
+/* --- time --- */
+
+/* From the last period on: a remainder of 64 bits takes long. */
+static void set_clock(struct controller *controller, int64_t time_us) {
+    const int64_t period_us = controller->parameters.pressure_loop.pwm_period_us;
+    int64_t *start_us = &controller->period_start_us;
+    *start_us += time_us - *start_us >= period_us ? period_us : 0;
+    if (time_us < *start_us || time_us - *start_us >= period_us) {
+        *start_us = time_us - time_us % period_us;
+    }
+    controller->clock = pressure_loop_clock_at(time_us, *start_us, CONTROLLER_STEP_US);
+    controller->steps_left = ((int32_t)period_us - controller->clock.phase_us - 1) / CONTROLLER_STEP_US;
+}
+
 /* --- pressures --- */
 
 static float supply_of(const struct controller *controller, const struct controller_input *input) {
@@ -237,7 +254,9 @@ static void receive_tip(struct controller *controller, const struct controller_i
         return;
     }
     controller->status.tip_overtaken += controller->tip_waits ? 1u : 0u;
+    controller->tip_since = controller->tip_waits ? controller->tip_since : controller->step;
     controller->tip_waits = true;
+    tip->came_us = input->time_us;
     tip->measured_us = input->tip_measured_us - controller->parameters.calibration.tip_late_us;
     tip->status = input->tip_status;
     for (uint32_t i = 0; i < 3u; i++) {
@@ -261,7 +280,7 @@ static void follow_tip(struct controller *controller, int64_t time_us) {
     controller->status.tip_samples += good ? 1u : 0u;
     controller->status.tip_rejected += good ? 0u : 1u;
     if (good) {
-        controller->tip_us = time_us;
+        controller->tip_us = tip->came_us;
         controller->tip_lost = false;
         controller->targets_stale = true;
     }
@@ -299,11 +318,38 @@ static void report_bend(struct controller *controller) {
     controller->status.bend_is_measured = !controller->tip_lost;
 }
 
-/* A late valve's duty has its turn in one of the last steps of a period. */
-static bool has_late_turn(const struct controller *controller, uint32_t c) {
+/* A valve's duty has its turn in the last step of a period, a late one's in one of the last. */
+static bool has_turn(const struct controller *controller, uint32_t c) {
     const struct pressure_loop_parameters *parameters = &controller->loop_parameters[c];
-    const int32_t left_us = (int32_t)parameters->pwm_period_us - controller->clock.phase_us, step_us = CONTROLLER_STEP_US;
-    return parameters->late_us > 0 && left_us > (int32_t)c * step_us && left_us <= ((int32_t)c + 1) * step_us;
+    const int32_t last = (int32_t)parameters->pwm_period_us / CONTROLLER_STEP_US - 1;
+    const int32_t turn = parameters->late_us > 0 ? (int32_t)c : 0;
+    return controller->steps_left == (turn < last ? turn : last);
+}
+
+/* Of a late valve's duty, through the pulses that are on their way. */
+static bool forecasts_long(const struct controller *controller) {
+    bool is_long = false;
+    for (uint32_t c = 0; c < 3u; c++) {
+        is_long = is_long || (controller->loop_parameters[c].late_us > 0 && has_turn(controller, c));
+    }
+    return is_long;
+}
+
+/* What this step checks of the table. */
+static uint32_t table_bytes_for(const struct controller *controller, const struct controller_input *input,
+                                enum look looks) {
+    const struct limits_parameters *parameters = &controller->parameters.limits;
+    const bool drives = controller->steps_left == 0, idle = looks == LOOK_IDLE;
+    if (looks == LOOK_AT_TIP || (drives && !idle)) {
+        return 0u;
+    }
+    const bool busy = drives || !idle || input->tip_new || forecasts_long(controller);
+    return busy ? parameters->table_bytes_busy : parameters->table_bytes_per_step;
+}
+
+static bool is_tip_due(const struct controller *controller) {
+    return controller->tip_waits && controller->tip_since != controller->step &&
+           controller->step - controller->tip_taken >= TIP_STEPS;
 }
 
 /* This step's one look into the table at length. `aims`: the targets want it. */
@@ -315,8 +361,9 @@ static enum look look(struct controller *controller, int64_t time_us, bool aims)
     }
     if (overdue) {
         update_capacities(controller, 1u);
-    } else if (controller->tip_waits && controller->step - controller->tip_taken >= TIP_STEPS) {
+    } else if (is_tip_due(controller)) {
         follow_tip(controller, time_us);
+        return LOOK_AT_TIP;
     } else if (controller->pose_waits) {
         judge_pose(controller);
     } else if (controller->creep_due) {
@@ -363,11 +410,12 @@ static enum supervisor_request request_of(const struct controller_command *comma
     }
 }
 
-static uint32_t find_corruption(struct controller *controller, const struct controller_input *input, bool busy) {
+static uint32_t find_corruption(struct controller *controller, const struct controller_input *input,
+                                uint32_t table_bytes) {
     const uint32_t count = controller->parameters.limits.parameter_bytes_per_step;
     uint32_t faults = 0u;
     if (controller->table != NULL &&
-        limits_check_table(&controller->limits, &controller->parameters.limits, controller->table, busy)) {
+        limits_check_table(&controller->limits, controller->table, table_bytes)) {
         faults |= 1u << FAULT_TABLE_CORRUPT;
     }
     const bool odd = controller->step % 2u != 0u;
@@ -425,13 +473,11 @@ static bool is_doubted(const struct controller *controller) {
     return doubted && controller->tip_lost && controller->table != NULL;
 }
 
-/* Whether a sensor is broken shows in what it `shows` itself, whether a chamber bursts in the pressure behind that. */
+/* `shows`: what the sensors say before it is corrected. */
 static uint32_t find_faults(struct controller *controller, const struct controller_input *input,
-                            const struct controller_input *shows, bool busy) {
+                            const struct controller_input *shows, uint32_t table_bytes) {
     const struct limits_parameters *limits = &controller->parameters.limits;
-    uint32_t faults = limits_check_pressures(limits, shows->pressure_pa, shows->pressure_ok);
-    faults &= ~(1u << FAULT_OVERPRESSURE);
-    faults |= limits_check_pressures(limits, input->pressure_pa, input->pressure_ok);
+    uint32_t faults = limits_check_pressures(limits, shows->pressure_pa, input->pressure_pa, input->pressure_ok);
     const float highest_pa = highest_pressure(controller);
     for (uint32_t c = 0; c < 3u; c++) {
         faults |= find_chamber_faults(controller, shows, c);
@@ -445,13 +491,13 @@ static uint32_t find_faults(struct controller *controller, const struct controll
     if (tip_watch_disagrees(&controller->tip_watch, &controller->parameters.tip_watch, input->time_us)) {
         faults |= 1u << FAULT_SENSORS_DISAGREE;
     }
-    return faults | find_corruption(controller, input, busy) | find_board_faults(controller, input, highest_pa);
+    return faults | find_corruption(controller, input, table_bytes) | find_board_faults(controller, input, highest_pa);
 }
 
 static void supervise(struct controller *controller, const struct controller_input *input,
-                      const struct controller_input *shows, bool busy) {
+                      const struct controller_input *shows, uint32_t table_bytes) {
     const struct controller_command *command = &input->command;
-    const uint32_t present = find_faults(controller, input, shows, busy);
+    const uint32_t present = find_faults(controller, input, shows, table_bytes);
     bool healthy = true; /* the self-test waits until every chamber has vented, should it run into a restart */
     for (uint32_t c = 0; c < 3u; c++) {
         healthy = healthy && input->pressure_pa[c] < SELFTEST_PRESSURE_PA;
@@ -557,8 +603,7 @@ static void drive(struct controller *controller, const struct controller_input *
         output->duty[c] = 0.0f;
         if (!output->valves_enabled) {
             pressure_loop_vent(loop, parameters, &controller->clock);
-        } else if (parameters->late_us == 0 || has_late_turn(controller, c) ||
-                   !(controller->status.pressure_target_pa[c] > 0.0f)) {
+        } else if (has_turn(controller, c) || !(controller->status.pressure_target_pa[c] > 0.0f)) {
             output->duty[c] = pressure_loop_duty(loop, parameters, controller->status.pressure_target_pa[c],
                                                  supply_of(controller, input), controller->capacity_m3[c],
                                                  &controller->clock);
@@ -596,8 +641,7 @@ static uint32_t find_warnings(const struct controller *controller, const struct 
 void controller_step(struct controller *controller, const struct controller_input *input,
                      struct controller_output *output) {
     struct controller_input corrected = *input;
-    controller->clock = pressure_loop_clock_at(input->time_us, controller->parameters.pressure_loop.pwm_period_us,
-                                               CONTROLLER_STEP_US);
+    set_clock(controller, input->time_us);
     correct(controller, &corrected);
     estimate(controller, &corrected);
     watch_pressures(controller, &corrected);
@@ -605,8 +649,7 @@ void controller_step(struct controller *controller, const struct controller_inpu
     const bool aims = controller->inverting || controller->targets_stale || input->command.kind != COMMAND_NONE;
     const enum look looks = look(controller, input->time_us, aims);
     watch_tip(controller, input->time_us);
-    const bool late = has_late_turn(controller, 0u) || has_late_turn(controller, 1u) || has_late_turn(controller, 2u);
-    supervise(controller, &corrected, input, late || looks != LOOK_IDLE);
+    supervise(controller, &corrected, input, table_bytes_for(controller, input, looks));
     aim(controller, looks == LOOK_FOR_TARGETS);
     drive(controller, &corrected, output);
     report_bend(controller);

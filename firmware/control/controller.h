@@ -84,6 +84,7 @@ struct controller_output {
 };
 
 struct controller_tip {
+    int64_t came_us;
     int64_t measured_us;
     float position_m[3];
     float quaternion[4];
@@ -136,14 +137,17 @@ struct controller {
     struct controller_tip tip;    /* a sample, waiting or taken last */
     struct controller_command active;
     int64_t command_us;
-    int64_t tip_us;
+    int64_t tip_us; /* when the last good sample came */
     struct bend_inverse inversion;
     struct pressure_loop_clock clock;
+    int64_t period_start_us; /* of the valves */
+    int32_t steps_left;      /* of that period, after this one */
     float capacity_m3[3];
     uint32_t capacity_next;  /* the chamber whose turn it is */
     uint32_t capacity_taken; /* step of the last */
     uint32_t step;
-    uint32_t tip_taken;  /* step of the last tip sample */
+    uint32_t tip_taken;  /* step of the last tip sample, */
+    uint32_t tip_since;  /* and since when one waits */
     bool tip_lost;
     bool targets_stale;  /* a new command or tip sample since the targets were taken up */
     bool inverting;      /* the inversion is under way */

@@ -66,9 +66,9 @@ static void rates(const struct pressure_loop *loop, const struct pressure_loop_p
 
 /* --- the valve's pulses --- */
 
-struct pressure_loop_clock pressure_loop_clock_at(int64_t time_us, int64_t pwm_period_us, int32_t step_us) {
+struct pressure_loop_clock pressure_loop_clock_at(int64_t time_us, int64_t period_start_us, int32_t step_us) {
     return (struct pressure_loop_clock){
-        .now_us = (uint32_t)time_us, .phase_us = (int32_t)(time_us % pwm_period_us), .step_us = step_us};
+        .now_us = (uint32_t)time_us, .phase_us = (int32_t)(time_us - period_start_us), .step_us = step_us};
 }
 
 static int32_t most(int32_t a, int32_t b) {

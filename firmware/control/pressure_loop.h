@@ -71,7 +71,7 @@ struct pressure_loop {
 /* Design page's nominal valve, gas and sensor. */
 void pressure_loop_default_parameters(struct pressure_loop_parameters *parameters);
 void pressure_loop_init(struct pressure_loop *loop);
-struct pressure_loop_clock pressure_loop_clock_at(int64_t time_us, int64_t pwm_period_us, int32_t step_us);
+struct pressure_loop_clock pressure_loop_clock_at(int64_t time_us, int64_t period_start_us, int32_t step_us);
 /* Carry the estimate through the step that ends now. `capacity_m3` is V + p_abs dV/dp of the chamber and tube. */
 void pressure_loop_predict(struct pressure_loop *loop, const struct pressure_loop_parameters *parameters,
                            float supply_pa, float capacity_m3, const struct pressure_loop_clock *clock);

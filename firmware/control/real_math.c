@@ -5,34 +5,6 @@
 
 #define ANGLE_MAX 1e4f
 
-bool real_is_finite(float x) {
-    return x - x == 0.0f;
-}
-
-float real_abs(float x) {
-    return x < 0.0f ? -x : x;
-}
-
-float real_min(float a, float b) {
-    return a < b ? a : b;
-}
-
-float real_max(float a, float b) {
-    return a > b ? a : b;
-}
-
-float real_clamp(float x, float low, float high) {
-    return x > low ? (x < high ? x : high) : low;
-}
-
-float real_sqrt(float x) {
-    return x > 0.0f ? __builtin_sqrtf(x) : 0.0f;
-}
-
-float real_hypot(float x, float y) {
-    return real_sqrt(x * x + y * y);
-}
-
 /* sin and cos on [-pi/4, pi/4] by their Taylor series, which end at x^9 and x^10 with remainders under 2e-9. */
 static float short_sin(float x) {
     const float s = x * x;

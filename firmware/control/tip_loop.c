@@ -40,7 +40,8 @@ bool tip_loop_bend_of(const float quaternion[4], float bend_rad[2]) {
     return true;
 }
 
-void tip_loop_predict_at(const struct bend_table *table, const struct bend_table_stencil *stencil, float bend_rad[2]) {
+void tip_loop_predict_at(const struct bend_table *table, const struct bend_table_stencil *stencil,
+                         float bend_rad[2]) {
     bend_rad[0] = table->module.active_length_m * bend_table_value(table, stencil, BEND_TABLE_CURVATURE_X);
     bend_rad[1] = table->module.active_length_m * bend_table_value(table, stencil, BEND_TABLE_CURVATURE_Y);
 }
@@ -52,9 +53,9 @@ void tip_loop_predict(const struct bend_table *table, const float pressure_pa[3]
 }
 
 /* The estimates `age_us` ago, between the two steps next to it. */
-static bool recall(const struct tip_loop *loop, int64_t age_us, int64_t step_us, float pressure_pa[3]) {
-    const int64_t whole = age_us / step_us;
-    if (whole < 0 || whole + 1 >= (int64_t)loop->stored) {
+static bool recall(const struct tip_loop *loop, int32_t age_us, int32_t step_us, float pressure_pa[3]) {
+    const int32_t whole = age_us / step_us;
+    if (whole < 0 || whole + 1 >= (int32_t)loop->stored) {
         return false;
     }
     const float share = (float)(age_us - whole * step_us) / (float)step_us;
@@ -76,14 +77,15 @@ static void limit(float vector[2], float most) {
 }
 
 bool tip_loop_update(struct tip_loop *loop, const struct tip_loop_parameters *parameters,
-                     const struct bend_table *table, const float quaternion[4], int64_t age_us, int64_t step_us) {
+                     const struct bend_table *table, const float quaternion[4], int64_t age_us,
+                     int64_t step_us) {
     float measured[2], predicted[2], pressure_pa[3];
     if (age_us < 0 || age_us > parameters->age_limit_us || !tip_loop_bend_of(quaternion, measured)) {
         return false;
     }
     loop->measured_rad[0] = measured[0];
     loop->measured_rad[1] = measured[1];
-    loop->compared = table != NULL && recall(loop, age_us, step_us, pressure_pa);
+    loop->compared = table != NULL && recall(loop, (int32_t)age_us, (int32_t)step_us, pressure_pa);
     if (!loop->compared) {
         return true; /* a good sample, from before the history began */
     }

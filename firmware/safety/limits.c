@@ -18,8 +18,8 @@ void limits_default_parameters(struct limits_parameters *parameters, const struc
         .over_working_steps = 20u,
         .sensor_least_pa = -2500.0f,
         .sensor_most_pa = 49900.0f,   /* of a range that ends at 50 kPa: a broken wire reads full scale */
-        .table_bytes_per_step = 320u, /* a round of the reference table takes about a second */
-        .table_bytes_busy = 96u,      /* 1.9 s, were every step busy */
+        .table_bytes_per_step = 448u, /* a round of the reference table takes about a second */
+        .table_bytes_busy = 144u,     /* 1.9 s, were every step busy and the tip sensor at its fastest */
         .parameter_bytes_per_step = 16u,
     };
 }
@@ -28,14 +28,19 @@ void limits_init(struct limits *limits) {
     *limits = (struct limits){.over_steps = 0u};
 }
 
-uint32_t limits_check_pressures(const struct limits_parameters *parameters, const float pressure_pa[3],
-                                const bool pressure_ok[3]) {
+static bool is_in_range(const struct limits_parameters *parameters, float pressure_pa) {
+    return pressure_pa >= parameters->sensor_least_pa && pressure_pa < parameters->sensor_most_pa; /* NaN is not */
+}
+
+uint32_t limits_check_pressures(const struct limits_parameters *parameters, const float shown_pa[3],
+                                const float pressure_pa[3], const bool pressure_ok[3]) {
     uint32_t faults = 0u;
     for (uint32_t c = 0; c < 3u; c++) {
-        const float p = pressure_pa[c];
-        if (!pressure_ok[c] || !(p >= parameters->sensor_least_pa) || !(p < parameters->sensor_most_pa)) {
+        const bool known = pressure_ok[c] && is_in_range(parameters, pressure_pa[c]);
+        if (!known || !is_in_range(parameters, shown_pa[c])) {
             faults |= 1u << FAULT_SENSOR_RANGE;
-        } else if (p > parameters->hard_pressure_pa) {
+        }
+        if (known && pressure_pa[c] > parameters->hard_pressure_pa) {
             faults |= 1u << FAULT_OVERPRESSURE;
         }
     }
@@ -61,8 +66,7 @@ bool limits_check_image(struct limits_image *image, const uint8_t *bytes, uint32
     return image->corrupt;
 }
 
-bool limits_check_table(struct limits *limits, const struct limits_parameters *parameters,
-                        const struct bend_table *table, bool busy) {
+bool limits_check_table(struct limits *limits, const struct bend_table *table, uint32_t count) {
     return limits_check_image(&limits->table, table->image + COVERED_FROM, table->image_bytes - COVERED_FROM,
-                              table->image_crc, busy ? parameters->table_bytes_busy : parameters->table_bytes_per_step);
+                              table->image_crc, count);
 }

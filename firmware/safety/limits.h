@@ -17,7 +17,8 @@ struct limits_parameters {
     float sensor_least_pa; /* readings outside are a sensor fault */
     float sensor_most_pa;
     uint32_t table_bytes_per_step; /* of the table's image checked in a step that has little else to do ... */
-    uint32_t table_bytes_busy;     /* ... and in one that has */
+    uint32_t table_bytes_busy;     /* ... and in one that has; none in one that follows a tip sample, or has much to
+                                      do and works out duties */
     uint32_t parameter_bytes_per_step; /* of the parameters, in each step */
 };
 
@@ -36,9 +37,10 @@ struct limits {
 /* From the table's module, or for the founding paper's module where `table` is NULL. */
 void limits_default_parameters(struct limits_parameters *parameters, const struct bend_table *table);
 void limits_init(struct limits *limits);
-/* Bits of enum supervisor_fault that these readings show. */
-uint32_t limits_check_pressures(const struct limits_parameters *parameters, const float pressure_pa[3],
-                                const bool pressure_ok[3]);
+/* Bits of enum supervisor_fault: whether a sensor is broken shows in what it says itself, `shown_pa`, too, whether a
+ * chamber bursts in the pressure behind that. */
+uint32_t limits_check_pressures(const struct limits_parameters *parameters, const float shown_pa[3],
+                                const float pressure_pa[3], const bool pressure_ok[3]);
 /* The highest estimate has been over the working limit for too long. */
 bool limits_check_working(struct limits *limits, const struct limits_parameters *parameters,
                           float highest_pa);
@@ -46,7 +48,6 @@ bool limits_check_working(struct limits *limits, const struct limits_parameters 
 bool limits_check_image(struct limits_image *image, const uint8_t *bytes, uint32_t size, uint32_t expected,
                         uint32_t count);
 /* The same of the table's image. */
-bool limits_check_table(struct limits *limits, const struct limits_parameters *parameters,
-                        const struct bend_table *table, bool busy);
+bool limits_check_table(struct limits *limits, const struct bend_table *table, uint32_t count);
 
 #endif

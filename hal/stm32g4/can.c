@@ -1,6 +1,7 @@
 #include "stm32g4/can.h"
 
 #include <stddef.h>
+#include <string.h>
 
 #include "stm32g4/conversions.h"
 #include "stm32g4/core.h"
@@ -40,7 +41,7 @@ static bool is_full(const struct frame_ring *ring) {
     return ring->written - ring->taken >= RING;
 }
 
-/* --- frames and message memory --- */
+/* --- frames and message memory: words of the bus are little-endian, as the core's --- */
 
 static void read_element(const struct fdcan_element *element, struct hal_can_frame *frame) {
     const uint32_t id = element->id, control = element->control;
@@ -52,9 +53,7 @@ static void read_element(const struct fdcan_element *element, struct hal_can_fra
     frame->length = !frame->fd && length > CLASSIC_BYTES ? CLASSIC_BYTES : length;
     for (uint32_t i = 0; i < frame->length; i += 4u) {
         const uint32_t word = element->data[i / 4u];
-        for (uint32_t k = 0; k < 4u; k++) {
-            frame->data[i + k] = (uint8_t)(word >> (8u * k));
-        }
+        (void)memcpy(&frame->data[i], &word, sizeof word);
     }
 }
 
@@ -65,8 +64,9 @@ static void write_element(struct fdcan_element *element, const struct hal_can_fr
     element->control = (code << FDCAN_CONTROL_LENGTH_SHIFT) |
                        (frame->fd ? FDCAN_CONTROL_FD | FDCAN_CONTROL_RATE_SWITCH : 0u);
     for (uint32_t i = 0; i < frame->length; i += 4u) {
-        element->data[i / 4u] = (uint32_t)frame->data[i] | ((uint32_t)frame->data[i + 1u] << 8) |
-                                ((uint32_t)frame->data[i + 2u] << 16) | ((uint32_t)frame->data[i + 3u] << 24);
+        uint32_t word;
+        (void)memcpy(&word, &frame->data[i], sizeof word);
+        element->data[i / 4u] = word;
     }
 }
 
@@ -117,12 +117,17 @@ void handler_fdcan1(void) {
 
 /* --- struct hal_bus --- */
 
+/* Mostly 8 of the 64 bytes that a frame has room for. */
+static void copy_frame(struct hal_can_frame *to, const struct hal_can_frame *from) {
+    (void)memcpy(to, from, offsetof(struct hal_can_frame, data) + from->length);
+}
+
 static bool can_receive(void *context, struct hal_can_frame *frame) {
     (void)context;
     if (received.taken == received.written) {
         return false;
     }
-    *frame = received.frame[received.taken % RING];
+    copy_frame(frame, &received.frame[received.taken % RING]);
     received.taken = received.taken + 1u;
     return true;
 }
@@ -143,7 +148,7 @@ static bool can_send(void *context, const struct hal_can_frame *frame) {
         transmit_lost = transmit_lost + 1u;
         return false;
     }
-    waiting.frame[waiting.written % RING] = *frame;
+    copy_frame(&waiting.frame[waiting.written % RING], frame);
     const uint32_t mask = core_mask();
     waiting.written = waiting.written + 1u;
     if ((FDCAN1->cccr & FDCAN_CCCR_INIT) == 0u) {

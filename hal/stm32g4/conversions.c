@@ -103,21 +103,23 @@ bool conversions_can_timing(uint32_t clock_hz, uint32_t rate, uint32_t sample_pe
     return false;
 }
 
-static const uint8_t length_of_code[16] = {0u, 1u,  2u,  3u,  4u,  5u,  6u,  7u,
+#define LENGTH_CODES 16u
+#define LENGTHS_AS_THEY_ARE 8u /* up to this one a length is its own code */
+
+static const uint8_t length_of_code[LENGTH_CODES] = {0u, 1u,  2u,  3u,  4u,  5u,  6u,  7u,
                                            8u, 12u, 16u, 20u, 24u, 32u, 48u, 64u};
 
 uint8_t conversions_can_length(uint32_t code) {
-    return length_of_code[code & 15u];
+    return length_of_code[code & (LENGTH_CODES - 1u)];
 }
 
 bool conversions_can_code(uint32_t length, uint32_t *code) {
-    for (uint32_t i = 0; i < 16u; i++) {
-        if (length_of_code[i] == length) {
-            *code = i;
-            return true;
-        }
+    uint32_t i = length < LENGTHS_AS_THEY_ARE ? length : LENGTHS_AS_THEY_ARE;
+    while (i < LENGTH_CODES && length_of_code[i] != length) {
+        i++;
     }
-    return false;
+    *code = i < LENGTH_CODES ? i : 0u;
+    return i < LENGTH_CODES;
 }
 
 uint32_t conversions_baud_divisor(uint32_t clock_hz, uint32_t baud) {

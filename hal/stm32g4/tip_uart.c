@@ -13,12 +13,7 @@
 #define FUNCTION 7u
 #define PRIORITY 2u
 
-struct arrival {
-    uint32_t us;
-    uint8_t byte;
-};
-
-static struct arrival ring[RING];
+static struct tip_uart_byte ring[RING];
 static volatile uint32_t written; /* by the interrupt alone */
 static volatile uint32_t taken;   /* by the control step alone */
 static struct tip_uart_errors counted;
@@ -39,7 +34,7 @@ static void keep(uint8_t byte) {
         counted.lost++;
         return;
     }
-    ring[written % RING] = (struct arrival){.us = time_base_now_us(), .byte = byte};
+    ring[written % RING] = (struct tip_uart_byte){.arrived_us = time_base_now_us(), .byte = byte};
     written = written + 1u;
 }
 
@@ -58,15 +53,14 @@ void handler_usart3(void) {
     }
 }
 
-bool tip_uart_take(uint8_t *byte, uint32_t *arrived_us) {
-    if (taken == written) {
-        return false;
+uint32_t tip_uart_take(struct tip_uart_byte *bytes, uint32_t most) {
+    const uint32_t from = taken, waiting = written - from;
+    const uint32_t count = waiting < most ? waiting : most;
+    for (uint32_t i = 0; i < count; i++) {
+        bytes[i] = ring[(from + i) % RING];
     }
-    const struct arrival *arrival = &ring[taken % RING];
-    *byte = arrival->byte;
-    *arrived_us = arrival->us;
-    taken = taken + 1u;
-    return true;
+    taken = from + count;
+    return count;
 }
 
 void tip_uart_errors(struct tip_uart_errors *errors) {

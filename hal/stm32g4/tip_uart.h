@@ -3,7 +3,6 @@
 #ifndef TRIBEND_STM32G4_TIP_UART_H
 #define TRIBEND_STM32G4_TIP_UART_H
 
-#include <stdbool.h>
 #include <stdint.h>
 
 struct tip_uart_errors {
@@ -13,9 +12,14 @@ struct tip_uart_errors {
     uint32_t lost;    /* bytes for which there was no room */
 };
 
+struct tip_uart_byte {
+    uint32_t arrived_us; /* in time_base_now_us() */
+    uint8_t byte;
+};
+
 void tip_uart_start(uint32_t clock_hz);
-/* The next byte and when it arrived, in time_base_now_us(). False: none. */
-bool tip_uart_take(uint8_t *byte, uint32_t *arrived_us);
+/* The next bytes, at most so many; returns how many there were. */
+uint32_t tip_uart_take(struct tip_uart_byte *bytes, uint32_t most);
 void tip_uart_errors(struct tip_uart_errors *errors);
 
 #endif

@@ -1,7 +1,6 @@
-/* The flashed ELF on the emulated board over a random mission: instructions of the control step, of the
+/* The flashed ELF on the emulated board over random missions: instructions of the whole step under several loads, of the
  * table's inversion and of each interrupt, and how fast the emulation is. */
-#include "hil/hil.h"
-#include "sim/random.h"
+#include "bench/board_load.h"
 
 #include <time.h>
 
@@ -51,20 +50,9 @@ static double seconds(clockid_t clock) {
     return (double)now.tv_sec + 1e-9 * (double)now.tv_nsec;
 }
 
-static void fly(void) {
-    struct random_stream chance;
-    random_seed(&chance, 5, 5);
-    for (int ms = 0; ms < MISSION_S * 1000; ms++) {
-        if (ms % 500 == 200) {
-            hil_bend(110.0 * random_uniform(&chance), 360.0 * random_uniform(&chance) - 180.0);
-        }
-        hil_run(1);
-    }
-}
-
 static void print_count(const char *what, const struct core_count *count) {
     if (count->entries > 0) {
-        printf("%-22s %8.0f instructions mean, %llu worst, of %llu\n", what,
+        printf("%-34s %8.0f instructions mean, %llu worst, of %llu\n", what,
                (double)count->instructions / (double)count->entries, (unsigned long long)count->most,
                (unsigned long long)count->entries);
     }
@@ -79,25 +67,33 @@ int main(void) {
     if (hil_open_table(NULL) != 0) {
         return 1;
     }
-    hil_start(1); /* through its self-test: commands before its end are refused */
+    board_load_start(&board_loads[0], 1);
     if (!board_probe(&hil.board, "bend_inverse_step", on_entry, &inversion)) {
         fprintf(stderr, "bench_board: the ELF has no bend_inverse_step\n");
         return 1;
     }
     const double wall_s = seconds(CLOCK_MONOTONIC), used_s = seconds(CLOCK_PROCESS_CPUTIME_ID);
-    fly();
+    board_load_fly(&board_loads[0], MISSION_S * 1000, 5);
     printf("emulated board         %8.1f x real time, plant and CAN included (%.1f x by the wall clock)\n",
            MISSION_S / (seconds(CLOCK_PROCESS_CPUTIME_ID) - used_s),
            MISSION_S / (seconds(CLOCK_MONOTONIC) - wall_s));
-    print_count("control step", &hil.board.core.step);
+    printf("whole step, CAN and telemetry included:\n");
+    print_count(board_loads[0].name, &hil.board.core.step);
     print_count("inversion, a step", &inversion.count);
     for (size_t i = 0; i < sizeof interrupts / sizeof interrupts[0]; i++) {
         print_count(interrupts[i].name, &hil.board.core.count[interrupts[i].exception]);
     }
-    const enum supervisor_state state = hil_state();
+    bool active = hil_state() == SUPERVISOR_ACTIVE;
     hil_off();
-    if (state != SUPERVISOR_ACTIVE) {
-        fprintf(stderr, "bench_board: the mission ended in %s\n", supervisor_state_name(state));
+    for (size_t i = 1; i < BOARD_LOADS && active; i++) {
+        board_load_start(&board_loads[i], 1);
+        board_load_fly(&board_loads[i], MISSION_S * 1000, 5);
+        print_count(board_loads[i].name, &hil.board.core.step);
+        active = hil_state() == SUPERVISOR_ACTIVE;
+        hil_off();
+    }
+    if (!active) {
+        fprintf(stderr, "bench_board: the mission ended in %s\n", supervisor_state_name(hil_state()));
         return 1;
     }
     return 0;

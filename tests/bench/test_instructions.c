@@ -1,9 +1,7 @@
-/* Bounds of the design page, on an emulated Cortex-M4F and short missions: a control step within 10,000 instructions, a
- * step of the inverse within 2,500 and 0.1 degree; and the same bits as on the host. `make bench PART=instructions`
- * takes longer missions and prints the figures. */
-#include "support/test.h"
-
-#include <stdlib.h>
+/* Bounds of the design page, on an emulated Cortex-M4F and short missions: a control step within 10,000 instructions, alone
+ * and with CAN and telemetry on the board, a step of the inverse within 2,500 and 0.1 degree; and the same bits as on the
+ * host. `make bench PART=instructions` and `PART=board` take longer missions and print the figures. */
+#include "bench/board_load.h"
 
 #include "instructions/compare.h"
 #include "program/table_file.h"
@@ -13,6 +11,7 @@
 #define INVERSION_BOUND 2500u
 #define STEPS 3500u
 #define INVERSIONS 500u
+#define FLIGHT_MS 6000
 #define DEGREES (180.0 / M_PI)
 
 static struct table_file file;
@@ -103,6 +102,24 @@ static void walks_over_a_table_with_a_fold_hold_the_bounds(void **state) {
     synthetic_table_free(&synthetic);
 }
 
+static void a_step_of_the_board_holds_the_bound_under_every_load(void **state) {
+    (void)state;
+    assert_int_equal(hil_open_table(NULL), 0);
+    for (size_t i = 0; i < BOARD_LOADS; i++) {
+        const struct core_count *step = &hil.board.core.step;
+        board_load_start(&board_loads[i], 1);
+        board_load_fly(&board_loads[i], FLIGHT_MS, 5);
+        print_message("           %s: mean %.0f, worst %llu instructions\n", board_loads[i].name,
+                      (double)step->instructions / (double)step->entries, (unsigned long long)step->most);
+        assert_in_range(step->entries, FLIGHT_MS - 2, FLIGHT_MS + 2);
+        assert_true(step->most <= STEP_BOUND);
+        hil_assert_state(SUPERVISOR_ACTIVE);
+        assert_int_equal(hil.heard[MESSAGE_TELEMETRY] > 0, board_loads[i].can_fd);
+        hil_off();
+    }
+    (void)hil_close_table(NULL);
+}
+
 static void counts_by_blocks_are_counts_by_instructions(void **state) {
     (void)state;
     open_mission(FRAME_NOMINAL, 14);
@@ -141,6 +158,7 @@ int main(void) {
         cmocka_unit_test(so_does_one_with_every_calibration_in_use),
         cmocka_unit_test(a_step_of_the_inverse_holds_its_bound_and_the_second_is_near_enough),
         cmocka_unit_test(walks_over_a_table_with_a_fold_hold_the_bounds),
+        cmocka_unit_test(a_step_of_the_board_holds_the_bound_under_every_load),
         cmocka_unit_test(counts_by_blocks_are_counts_by_instructions),
         cmocka_unit_test(another_table_on_the_board_is_noticed),
     };

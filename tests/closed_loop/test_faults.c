@@ -105,7 +105,7 @@ static void hold_times_out_too(void **state) {
 static void table_corrupt(void **state) {
     (void)state;
     static struct rig rig;
-    const int round_ms = (int)(rig_file.table.image_bytes / 160u) + 2; /* 320 bytes in an idle step, 96 in another */
+    const int round_ms = (int)(rig_file.table.image_bytes / 160u) + 2; /* 448 bytes in an idle step, 144 or none in another */
     int slowest_ms = 0;
     for (uint64_t mission = 0; mission < MISSIONS; mission++) {
         const size_t byte = 16 + mission * 2971 % (rig_file.size - 16);

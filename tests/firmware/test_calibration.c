@@ -121,6 +121,10 @@ static void a_valve_that_is_known_to_be_late_does_not_make_the_pressure_swing(vo
     assert_under(late.wander_pa, 0.7 * unknown.wander_pa);
 }
 
+static struct pressure_loop_clock clock_at(const struct pressure_loop_parameters *parameters, int64_t time_us) {
+    return pressure_loop_clock_at(time_us, time_us - time_us % parameters->pwm_period_us, 1000);
+}
+
 static void cut_a_late_valve(int64_t from_us) {
     struct pressure_loop_parameters parameters;
     struct pressure_loop loop;
@@ -129,7 +133,7 @@ static void cut_a_late_valve(int64_t from_us) {
     pressure_loop_init(&loop);
     struct pressure_loop_clock clock = {.now_us = 0};
     for (int64_t time_us = from_us + 1000; time_us <= from_us + 100000; time_us += 1000) {
-        clock = pressure_loop_clock_at(time_us, parameters.pwm_period_us, 1000);
+        clock = clock_at(&parameters, time_us);
         pressure_loop_predict(&loop, &parameters, 40000.0f, 2e-4f, &clock);
         (void)pressure_loop_duty(&loop, &parameters, 8000.0f, 40000.0f, 2e-4f, &clock);
     }
@@ -137,7 +141,7 @@ static void cut_a_late_valve(int64_t from_us) {
     pressure_loop_vent(&loop, &parameters, &clock);
     const float at_cut_pa = loop.estimate_pa;
     for (int64_t time_us = from_us + 101000; time_us <= from_us + 300000; time_us += 1000) {
-        clock = pressure_loop_clock_at(time_us, parameters.pwm_period_us, 1000);
+        clock = clock_at(&parameters, time_us);
         pressure_loop_predict(&loop, &parameters, 40000.0f, 2e-4f, &clock);
         assert_true(loop.estimate_pa <= at_cut_pa + 20.0f); /* what a close delay of 1 ms still lets in */
     }
@@ -163,7 +167,7 @@ static void a_valve_shut_for_hours_still_counts_as_vented(void **state) {
     pressure_loop_default_parameters(&parameters);
     pressure_loop_init(&loop);
     for (int64_t time_us = 1000000; time_us < 20000000000; time_us += 1000000) {
-        const struct pressure_loop_clock clock = pressure_loop_clock_at(time_us, parameters.pwm_period_us, 1000);
+        const struct pressure_loop_clock clock = clock_at(&parameters, time_us);
         pressure_loop_predict(&loop, &parameters, 40000.0f, 2e-4f, &clock);
         assert_true(pressure_loop_vented_us(&loop, &clock) >= 1000000);
         assert_true(loop.estimate_pa <= 0.0f);
