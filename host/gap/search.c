@@ -21,16 +21,17 @@ static bool prepare(struct search *search) {
  * by them: a log that is written more often than the sensor measures has them too. */
 static bool take_repeats(struct search *search, size_t step) {
     const struct effect_kind *kind = effect_kind_find("tip_freeze");
-    const double share = gap_data_repeated_share(search->data);
+    const struct gap_repeats repeats = gap_data_repeats(search->data);
     const bool known = kind == NULL || search_leaves_out(search, kind->name) ||
                        gap_model_has(&search->best.model, kind, 0, 0);
-    if (known || share < REPEATS_CERTAIN || search->best.model.count == GAP_EFFECTS_MAX) {
+    if (known || repeats.share < REPEATS_CERTAIN || search->best.model.count == GAP_EFFECTS_MAX) {
         return true;
     }
     struct effect effect;
     struct fit with = search->best;
     effect_init(&effect, kind);
-    effect.parameter[0] = share;
+    effect.parameter[0] = repeats.share;
+    effect.onset_s = repeats.onset_s;
     gap_model_add(&with.model, &effect);
     const bool sound = search_recalibrate(search, &with, true);
     if (sound && search_held_out(&with) < search_held_out(&search->best) - search_gain_by_noise(&with)) {
