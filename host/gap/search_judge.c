@@ -15,7 +15,10 @@
 #define WHOLE_SHARE 0.95      /* of such a small rest, that an effect must explain, .. */
 #define TRACE_SHARE 0.98      /* .. and of a trace, .. */
 #define TRACE_SIGNAL 10.0     /* .. which is so many times what is worth explaining at all */
-#define FAINT_LEFT 0.25       /* of a faint gap: more than that left means that something else was meant */
+/* Of a faint gap: more than that left means that something else was meant, but for what chance makes of so little. */
+#define FAINT_LEFT 0.25
+#define FAINT_LEFT_BY_CHANCE 0.4
+#define FAINT_REST 0.1 /* mean square */
 
 double search_held_out(const struct fit *fit) {
     return fit->sound ? fit_squares(&fit->sums, 1) : INFINITY;
@@ -77,6 +80,23 @@ static size_t added(const struct fit *before, const struct fit *after) {
     return parts_of(before, after->model.effect[place].kind) > 0 ? after->model.count - 1 : place;
 }
 
+/* What the laws of the model's effects may leave in a group by being other than the real causes' own: that of their sizes, as a
+ * share of squares. Where pressures are measured, what acts before them errs there, and no longer at the tip. */
+static double form_share(const struct fit *fit, enum fit_group group) {
+    const bool measured = fit->sums.part[1][FIT_PRESSURE].count > 0.0;
+    double most = 0.0;
+    for (size_t e = 0; e < fit->model.count; e++) {
+        const struct effect_kind *kind = fit->model.effect[e].kind;
+        double doubt = INFINITY;
+        for (size_t i = 0; i < kind->parameter_count; i++) {
+            doubt = kind->doubt[i] > 0.0 ? fmin(doubt, kind->doubt[i]) : doubt;
+        }
+        const bool here = gap_effect_upstream(kind) ? group == FIT_PRESSURE || !measured : group == FIT_TIP;
+        most = here && isfinite(doubt) ? fmax(most, doubt * doubt) : most;
+    }
+    return fmin(most, POLISH_SHARE);
+}
+
 /* A further effect must be the rest of the explanation, of the pressures or of the tip; not polish on a form
  * that only nearly fits. A small rest may as well be the form: of that, a simple effect must explain nearly
  * all, as no form's error is likely to be just what another effect does. */
@@ -92,9 +112,10 @@ static bool completes(const struct search *search, const struct fit *before, con
         const bool whole =
             left > 3.0 * STRUCTURE_LEAST && then < fmax((1.0 - WHOLE_SHARE) * left, STRUCTURE_LEAST);
         const bool trace = left > TRACE_SIGNAL * STRUCTURE_LEAST && then < (1.0 - TRACE_SHARE) * left;
+        const double form = form_share(before, group);
         any = any || (is_left(search, before, group, POLISH_SHARE, MATERIAL_SHARE) && halves) ||
-              (simple && ((is_left(search, before, group, FORM_LEAST, ELSEWHERE_SHARE) && whole) ||
-                          (is_left(search, before, group, TRACE_LEAST, ELSEWHERE_SHARE) && trace)));
+              (simple && ((is_left(search, before, group, fmax(FORM_LEAST, form), ELSEWHERE_SHARE) && whole) ||
+                          (is_left(search, before, group, fmax(TRACE_LEAST, form), ELSEWHERE_SHARE) && trace)));
     }
     return any;
 }
@@ -114,7 +135,9 @@ static bool repeats_kind(const struct gap_model *model) {
 
 bool search_earns_place(const struct search *search, const struct fit *before, const struct fit *after) {
     if (before->model.count == 0) {
-        const bool all_of_it = search_structure(after) < FAINT_LEFT * search_structure(before);
+        const double faint = search_structure(before);
+        const bool all_of_it =
+            search_structure(after) < fmax(FAINT_LEFT * faint, fmin(FAINT_LEFT_BY_CHANCE * faint, FAINT_REST));
         return search_is_better(before, after) && (all_of_it || search_structure(before) > FAINT);
     }
     const size_t place = added(before, after);
