@@ -249,6 +249,7 @@ bool diagnosis_conclude(struct diagnosis *diagnosis, struct search *search) {
     }
     diagnosis_doubt_floor(diagnosis, search);
     diagnosis_suggest(diagnosis);
+    diagnosis_temper(diagnosis, search);
     return dependence_find(&diagnosis->dependences, search,
                            diagnosis->verdict == GAP_UNKNOWN && search->best.model.count > 0);
 }
