@@ -13,26 +13,27 @@ enum { WIDTH, MEMORY };
 enum { ALL_SIZES, ONE_SIZE };
 
 #define PLAYS 5
-#define RADII_RATIO 1.7
 #define WIDTH_MOST 0.2
 /* At 1 / PLAYS the bend would stand still wherever the load turns round, and beyond it go on the wrong way: no weight comes
  * near, however wide a loop is asked for. */
 #define WEIGHT_MOST 0.18
-#define CORNER 8.0 /* how sharply it is held there */
 
-static double radius_of(size_t form, size_t play, double memory) {
-    return form == ONE_SIZE ? memory * (double)(play + 1) / PLAYS : memory / pow(RADII_RATIO, (double)play);
-}
+/* Radii over the memory. */
+#define SMALLER 1.7
+static const double shares[2][PLAYS] = {
+    [ALL_SIZES] = {1.0, 1.0 / SMALLER, 1.0 / (SMALLER * SMALLER), 1.0 / (SMALLER * SMALLER * SMALLER),
+                   1.0 / (SMALLER * SMALLER * SMALLER * SMALLER)},
+    [ONE_SIZE] = {0.2, 0.4, 0.6, 0.8, 1.0}};
 
 /* A play of radius r, weight one, opens a cycle of length one by 2 r, or by what is left of the cycle. */
 static double weight_of(size_t form, const double *parameter) {
     double opening = 0.0;
     for (size_t i = 0; i < PLAYS; i++) {
-        const double radius = radius_of(form, i, parameter[MEMORY]);
+        const double radius = shares[form][i] * parameter[MEMORY];
         opening += fmax(fmin(2.0 * radius, 1.0 - 2.0 * radius), 0.0);
     }
-    const double weight = parameter[WIDTH] / opening;
-    return weight / pow(1.0 + pow(fabs(weight) / WEIGHT_MOST, CORNER), 1.0 / CORNER);
+    const double weight = parameter[WIDTH] / opening, square = weight * weight / (WEIGHT_MOST * WEIGHT_MOST);
+    return weight / sqrt(sqrt(sqrt(1.0 + square * square * square * square))); /* straight, with a sharp bend there */
 }
 
 /* The follower stays within the radius of what it follows. */
@@ -49,7 +50,7 @@ static void lag(double *state, const double *parameter, struct effect_signals *s
     const double weight = weight_of(signals->form, parameter), limit_rad = (double)signals->table->module.bend_limit_rad;
     for (size_t i = 0; i < PLAYS; i++) {
         double *follower = &state[2 * i];
-        follow(follower, bend, radius_of(signals->form, i, parameter[MEMORY]) * limit_rad);
+        follow(follower, bend, shares[signals->form][i] * parameter[MEMORY] * limit_rad);
         signals->shape->bend_x_rad -= weight * (bend[0] - follower[0]);
         signals->shape->bend_y_rad -= weight * (bend[1] - follower[1]);
     }
