@@ -38,7 +38,7 @@ static void put_best_first(struct fit **order, size_t count) {
  * `none`. */
 static size_t place_starts(struct fitter *fitter, const struct search *search, const struct gap_model *onto,
                            const struct search_candidate *candidate, struct effect starts[STARTS_KEPT]) {
-    double gains[STARTS_KEPT];
+    double gains[STARTS_KEPT] = {0.0};
     size_t kept = 0;
     fitter_evaluate(fitter, onto);
     for (size_t k = 0; k < SEARCH_STARTS_PLACED; k++) {
