@@ -11,9 +11,11 @@
 #include "safety/supervisor.h"
 
 #define UNIT_TOLERANCE 0.05  /* of a quaternion's length */
-#define MOVING_LEAST 20     /* samples that say anything */
+#define TELLING_LEAST 20    /* samples that say anything */
 #define WINDOW 15            /* samples on either side: longer than repeats go on .. */
 #define MOVED_M 6e-3         /* .. over which the tip moves so far that an exact repeat is no coincidence of the steps */
+#define FINE_LEAST 100       /* pairs of samples that tell whether steps are fine */
+#define FINE_SHARE 0.01      /* of their coordinates that are the same */
 #define ONSET_STEP_S 0.1     /* an onset of repeats is not sought closer than that */
 #define ONSET_GAIN 12.0      /* by so much the logarithm of the likelihood speaks for it */
 #define ONSET_BEFORE 0.1     /* share of repeats before it, of that after, at most */
@@ -96,11 +98,27 @@ static bool is_moving(const struct gap_run *run, size_t i) {
     return moved > MOVED_M;
 }
 
-static void count_repeats(struct gap_run *run) {
+/* Coordinates that come back one by one are those of a sensor with coarse steps, which may also all come back at once. */
+static bool has_fine_steps(const struct gap_run *run) {
+    size_t pairs = 0, same = 0;
     for (size_t i = 1; i < run->tips; i++) {
-        struct gap_tip *tip = &run->tip[i];
-        tip->repeated = is_repeat(tip, &run->tip[i - 1]);
-        tip->moving = is_moving(run, i);
+        if (!run->tip[i].repeated) {
+            pairs++;
+            for (size_t k = 0; k < 3; k++) {
+                same += run->tip[i].position_m[k] == run->tip[i - 1].position_m[k] ? 1 : 0;
+            }
+        }
+    }
+    return pairs >= FINE_LEAST && (double)same < FINE_SHARE * 3.0 * (double)pairs;
+}
+
+static void find_repeats(struct gap_run *run) {
+    for (size_t i = 1; i < run->tips; i++) {
+        run->tip[i].repeated = is_repeat(&run->tip[i], &run->tip[i - 1]);
+    }
+    const bool fine = has_fine_steps(run);
+    for (size_t i = 1; i < run->tips; i++) {
+        run->tip[i].telling = fine || is_moving(run, i);
     }
 }
 
@@ -191,7 +209,7 @@ static bool take_log(struct gap_run *run, const struct run_log *log, char *error
     for (size_t row = 0; row < log->rows; row++) {
         run->tips += take_tip(run, log, row, tip_column);
     }
-    count_repeats(run);
+    find_repeats(run);
     find_cuts(run, log);
     if (!find_breaks(run, log)) {
         return out_of_memory(run, error, error_bytes);
@@ -243,7 +261,7 @@ static struct repeat_count count_since(const struct gap_data *data, double since
         const struct gap_run *run = &data->run[i];
         for (size_t t = 0; t < run->tips; t++) {
             const struct gap_tip *tip = &run->tip[t];
-            if (tip->moving && tip->time_s >= since_s && tip->time_s < until_s) {
+            if (tip->telling && tip->time_s >= since_s && tip->time_s < until_s) {
                 count.samples += 1.0;
                 count.repeats += tip->repeated ? 1.0 : 0.0;
                 count.runs += tip->repeated && t > 0 && !run->tip[t - 1].repeated ? 1.0 : 0.0;
@@ -268,19 +286,19 @@ struct gap_repeats gap_data_repeats(const struct gap_data *data) {
     }
     const double run_samples = fmax(all.repeats / fmax(all.runs, 1.0), 1.0);
     const int steps = (int)fmin(last_s / ONSET_STEP_S, 1e5);
-    for (int step = 1; step < steps && all.repeats >= MOVING_LEAST; step++) {
+    for (int step = 1; step < steps && all.repeats >= TELLING_LEAST; step++) {
         const double at_s = step * ONSET_STEP_S;
         const struct repeat_count early = count_since(data, -INFINITY, at_s), late = count_since(data, at_s, INFINITY);
         /* what comes in runs says less */
         const double gain = (log_likelihood(&early) + log_likelihood(&late) - log_likelihood(&all)) / run_samples;
         const bool rare = early.repeats * late.samples < ONSET_BEFORE * late.repeats * early.samples;
-        if (rare && early.samples >= MOVING_LEAST && late.samples >= MOVING_LEAST && gain > fmax(most, ONSET_GAIN)) {
+        if (rare && early.samples >= TELLING_LEAST && late.samples >= TELLING_LEAST && gain > fmax(most, ONSET_GAIN)) {
             most = gain;
             onset_s = at_s;
             after = late;
         }
     }
-    const bool enough = after.samples >= MOVING_LEAST;
+    const bool enough = after.samples >= TELLING_LEAST;
     return (struct gap_repeats){onset_s, enough ? after.repeats / after.samples : 0.0, after.samples,
                                 fmax(after.repeats / fmax(after.runs, 1.0), 1.0)};
 }

@@ -15,7 +15,7 @@ struct gap_tip {
     double position_m[3];
     double quaternion[4]; /* w, x, y, z; NAN where only the position was measured */
     bool repeated;        /* the same words as the sample before .. */
-    bool moving;          /* .. which says something: the tip moves */
+    bool telling;         /* .. which is then no coincidence: the tip moves, or the log shows finer steps than its noise */
 };
 
 /* The tip in the base frame; the quaternion NAN where only the position is known. */
@@ -68,7 +68,7 @@ struct gap_data {
 
 /* Reads the logs; the baseline is our own replay. False: `error` names file, line, column and remedy. */
 bool gap_data_read(struct gap_data *data, const char *const *paths, size_t count, char *error, size_t error_bytes);
-/* Samples that repeat the one before, among those taken while the tip moved, over all runs. */
+/* Samples that repeat the one before, among those where a repeat is no coincidence, over all runs. */
 struct gap_repeats {
     double onset_s;  /* hardly any came before, in any run; 0: from the start */
     double share;    /* of the samples since then */

@@ -7,11 +7,13 @@
 #define COMPLETING_SHARE 0.5 /* of what is left, that a further effect must explain */
 /* Shares of the gap, in pressures or at the tip: */
 #define POLISH_SHARE 0.025  /* less than that is left by any form of the right effect, .. */
+#define EXACT_SHARE 0.01    /* .. less than that by effects that have but one form, .. */
 #define FORM_LEAST 0.0005   /* .. less than that by most forms of it, .. */
 #define TRACE_LEAST 0.00005 /* .. and less than that by all: no effect is sought for it */
 /* Shares of the whole gap: */
 #define MATERIAL_SHARE 0.0003 /* less than that, elsewhere than the gap lies, is form, .. */
 #define ELSEWHERE_SHARE 3e-5  /* .. down to that, if no simple effect explains it whole */
+#define LAW_AT_TIP 0.2      /* of a law's doubt: what it leaves at the tip, where six coordinates hold it */
 #define WHOLE_SHARE 0.95      /* of such a small rest, that an effect must explain, .. */
 #define TRACE_SHARE 0.98      /* .. and of a trace, .. */
 #define TRACE_SIGNAL 10.0     /* .. which is so many times what is worth explaining at all */
@@ -92,9 +94,20 @@ static double form_share(const struct fit *fit, enum fit_group group) {
             doubt = kind->doubt[i] > 0.0 ? fmin(doubt, kind->doubt[i]) : doubt;
         }
         const bool here = gap_effect_upstream(kind) ? group == FIT_PRESSURE || !measured : group == FIT_TIP;
+        doubt *= group == FIT_TIP ? LAW_AT_TIP : 1.0;
         most = here && isfinite(doubt) ? fmax(most, doubt * doubt) : most;
     }
     return fmin(most, POLISH_SHARE);
+}
+
+/* Geometry and timing of sensors have no other form than theirs. */
+static bool is_exact(const struct gap_model *model) {
+    bool exact = true;
+    for (size_t e = 0; e < model->count; e++) {
+        const struct effect_kind *kind = model->effect[e].kind;
+        exact = exact && kind->stage == EFFECT_STAGE_TIP_SENSOR && kind->forms < 2;
+    }
+    return exact;
 }
 
 /* A further effect must be the rest of the explanation, of the pressures or of the tip; not polish on a form
@@ -113,7 +126,8 @@ static bool completes(const struct search *search, const struct fit *before, con
             left > 3.0 * STRUCTURE_LEAST && then < fmax((1.0 - WHOLE_SHARE) * left, STRUCTURE_LEAST);
         const bool trace = left > TRACE_SIGNAL * STRUCTURE_LEAST && then < (1.0 - TRACE_SHARE) * left;
         const double form = form_share(before, group);
-        any = any || (is_left(search, before, group, POLISH_SHARE, MATERIAL_SHARE) && halves) ||
+        const double polish = is_exact(&before->model) ? EXACT_SHARE : POLISH_SHARE;
+        any = any || (is_left(search, before, group, polish, MATERIAL_SHARE) && halves) ||
               (simple && ((is_left(search, before, group, fmax(FORM_LEAST, form), ELSEWHERE_SHARE) && whole) ||
                           (is_left(search, before, group, fmax(TRACE_LEAST, form), ELSEWHERE_SHARE) && trace)));
     }
