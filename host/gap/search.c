@@ -5,7 +5,8 @@
 
 #define REPEATS_CERTAIN 0.04 /* share of repeated samples that no noise makes */
 #define REVISIONS 3
-#define DISBELIEVED 0.1 /* an effect that its rivals leave so little belief gives way to the best of them */
+#define DISBELIEVED 0.1 /* an effect that its rivals leave so little belief gives way to the best of them, .. */
+#define BELIEVED 0.65   /* .. or to one that would be the verdict */
 #define DOUBTED 0.65    /* a further effect that its rivals leave less is left out, if the others .. */
 #define EXPLAINED_SHARE 0.03 /* .. leave no more than that of the gap by themselves */
 
@@ -113,7 +114,8 @@ static const struct fit *ask_rivals(const struct search *search) {
     for (size_t r = 0; r < search->rivals_count; r++) {
         const struct rivals *rivals = &search->rivals[r];
         const bool by_chance = search->best.model.effect[rivals->place].kind->by_chance;
-        if (!by_chance && rivals->count > 1 && belief_in_held(search, rivals) < DISBELIEVED) {
+        const double held = belief_in_held(search, rivals), best = rivals->rival[0].belief;
+        if (!by_chance && rivals->count > 1 && (held < DISBELIEVED || (held < best && best > BELIEVED))) {
             return &rivals->rival[0].fit;
         }
     }
