@@ -18,6 +18,9 @@
 #define UNEXPLAINED_MOST 0.1  /* .. but for what its own law may leave, at most that, .. */
 #define TRACE_SHARE 0.98      /* .. and of a trace, .. */
 #define TRACE_SIGNAL 10.0     /* .. which is so many times what is worth explaining at all */
+/* Of pressures that no effect acts on yet: so much is no form's doing, and an effect must explain all but that. */
+#define UNTOUCHED_LEAST 0.1
+#define UNTOUCHED_LEFT 0.15
 /* Of a faint gap: more than that left means that something else was meant, but for what chance makes of so little. */
 #define FAINT_LEFT 0.25
 #define FAINT_LEFT_BY_CHANCE 0.4
@@ -83,15 +86,6 @@ static size_t added(const struct fit *before, const struct fit *after) {
     return parts_of(before, after->model.effect[place].kind) > 0 ? after->model.count - 1 : place;
 }
 
-/* Of a law: its least, over the parameters that have one. */
-static double doubt_of(const struct effect_kind *kind) {
-    double doubt = INFINITY;
-    for (size_t i = 0; i < kind->parameter_count; i++) {
-        doubt = kind->doubt[i] > 0.0 ? fmin(doubt, kind->doubt[i]) : doubt;
-    }
-    return isfinite(doubt) ? doubt : 0.0;
-}
-
 /* What the laws of the model's effects may leave in a group by being other than the real causes' own: that of their sizes, as a
  * share of squares. Where pressures are measured, what acts before them errs there, and no longer at the tip. */
 static double form_share(const struct fit *fit, enum fit_group group) {
@@ -99,11 +93,19 @@ static double form_share(const struct fit *fit, enum fit_group group) {
     double most = 0.0;
     for (size_t e = 0; e < fit->model.count; e++) {
         const struct effect_kind *kind = fit->model.effect[e].kind;
-        const double doubt = doubt_of(kind) * (group == FIT_TIP ? LAW_AT_TIP : 1.0);
+        const double doubt = effect_doubt(kind) * (group == FIT_TIP ? LAW_AT_TIP : 1.0);
         const bool here = gap_effect_upstream(kind) ? group == FIT_PRESSURE || !measured : group == FIT_TIP;
         most = here ? fmax(most, doubt * doubt) : most;
     }
     return fmin(most, POLISH_SHARE);
+}
+
+static bool acts_on_pressures(const struct gap_model *model) {
+    bool acts = false;
+    for (size_t e = 0; e < model->count; e++) {
+        acts = acts || gap_effect_upstream(model->effect[e].kind);
+    }
+    return acts;
 }
 
 /* Geometry and timing of sensors have no other form than theirs. */
@@ -122,7 +124,7 @@ static bool is_exact(const struct gap_model *model) {
 static bool completes(const struct search *search, const struct fit *before, const struct fit *after) {
     const struct effect_kind *kind = after->model.effect[added(before, after)].kind;
     const bool simple = parts_of(after, kind) == 1;
-    const double law = doubt_of(kind), unexplained = fmin(fmax(1.0 - WHOLE_SHARE, law * law), UNEXPLAINED_MOST);
+    const double law = effect_doubt(kind), unexplained = fmin(fmax(1.0 - WHOLE_SHARE, law * law), UNEXPLAINED_MOST);
     bool any = false;
     for (int g = gap_effect_upstream(kind) ? FIT_PRESSURE : FIT_TIP; g < FIT_GROUPS; g++) {
         const enum fit_group group = (enum fit_group)g;
@@ -133,8 +135,10 @@ static bool completes(const struct search *search, const struct fit *before, con
             left > 3.0 * STRUCTURE_LEAST && then < fmax(unexplained * left, STRUCTURE_LEAST);
         const bool trace = left > TRACE_SIGNAL * STRUCTURE_LEAST && then < (1.0 - TRACE_SHARE) * left;
         const double form = form_share(before, group);
+        const bool untouched = group == FIT_PRESSURE && !acts_on_pressures(&before->model) && left > UNTOUCHED_LEAST &&
+                               then < UNTOUCHED_LEFT * left;
         const double polish = is_exact(&before->model) ? EXACT_SHARE : POLISH_SHARE;
-        any = any || (is_left(search, before, group, polish, MATERIAL_SHARE) && halves) ||
+        any = any || (simple && untouched) || (is_left(search, before, group, polish, MATERIAL_SHARE) && halves) ||
               (simple && ((is_left(search, before, group, fmax(FORM_LEAST, form), ELSEWHERE_SHARE) && whole) ||
                           (is_left(search, before, group, fmax(TRACE_LEAST, form), ELSEWHERE_SHARE) && trace)));
     }
