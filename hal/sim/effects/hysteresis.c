@@ -16,7 +16,7 @@ enum { ALL_SIZES, ONE_SIZE };
 #define WIDTH_MOST 0.2
 /* At 1 / PLAYS the bend would stand still wherever the load turns round, and beyond it go on the wrong way: no weight comes
  * near, however wide a loop is asked for. */
-#define WEIGHT_MOST 0.18
+#define WEIGHT_MOST 0.195
 
 /* Radii over the memory. */
 #define SMALLER 1.7
