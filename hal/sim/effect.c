@@ -66,6 +66,14 @@ static effect_hook hook_of(const struct effect_kind *kind, enum effect_hook_kind
     }
 }
 
+double effect_doubt(const struct effect_kind *kind) {
+    double doubt = INFINITY;
+    for (size_t i = 0; i < kind->parameter_count; i++) {
+        doubt = kind->doubt[i] > 0.0 ? fmin(doubt, kind->doubt[i]) : doubt;
+    }
+    return isfinite(doubt) ? doubt : 0.0;
+}
+
 bool effect_has(const struct effect_kind *kind, enum effect_hook_kind hook) {
     return hook_of(kind, hook) != NULL;
 }

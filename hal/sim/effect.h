@@ -64,6 +64,7 @@ struct effect_signals {
                                           * pose hooks may look, after all the load hooks */
     struct body_shape *shape;            /* shape hook */
     struct tip_pose *pose;               /* pose hook */
+    bool repeats;                        /* pose hook: to be set where the sensor gives its last sample again, noise and all */
 };
 
 typedef void (*effect_hook)(double *state, const double *parameter, struct effect_signals *signals);
@@ -82,6 +83,8 @@ struct effect_kind {
     bool by_sample; /* what it does depends on when the sensor samples: a replay may not leave samples out */
     size_t parameter_count;
     struct effect_parameter parameter[EFFECT_PARAMETERS_MAX];
+    double doubt[EFFECT_PARAMETERS_MAX]; /* real causes follow laws of their own: by how much that puts a parameter off where
+                                          * this law fits best, one standard deviation, as a share of its size; 0: unknown */
     effect_hook command; /* at the start of a PWM period */
     effect_hook gas;     /* before each step of the gas */
     effect_hook reading; /* after each step of the gas */
@@ -118,6 +121,8 @@ void effect_init(struct effect *effect, const struct effect_kind *kind);
 /* "NAME" or "NAME:parameter=value,parameter=value" in SI units; chamber=N, form=N and onset=SECONDS as well. False: `error` says
  * what is wrong. */
 bool effect_parse(const char *text, struct effect *effect, char *error, size_t error_bytes);
+/* Of its law: the least doubt, over the parameters that have one; 0: none has. */
+double effect_doubt(const struct effect_kind *kind);
 bool effect_has(const struct effect_kind *kind, enum effect_hook_kind hook);
 /* Call that hook of each effect that has it, within its chamber and after its onset. */
 void effects_run(struct effect *effect, size_t count, enum effect_hook_kind hook, struct effect_signals *signals);

@@ -142,4 +142,5 @@ void plant_sample_tip(struct plant *plant, const double *pressure_pa, double tim
     body_tip_pose(&plant->table->module, &plant->shape, &plant->pose);
     signals.pose = &plant->pose;
     effects_run(plant->effect, plant->effect_count, EFFECT_HOOK_POSE, &signals);
+    plant->tip_repeats = signals.repeats;
 }

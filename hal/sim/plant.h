@@ -43,6 +43,7 @@ struct plant {
     double temperature_k;               /* of the module, for effects; NAN: not known */
     struct body_shape shape;            /* at the last tip sample */
     struct tip_pose pose;
+    bool tip_repeats;                   /* .. for which the sensor gives the sample before again */
 };
 
 /* The design page's nominal plant. */

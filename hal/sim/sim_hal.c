@@ -69,6 +69,11 @@ static void sample_tip(struct sim *sim) {
     plant_sample_tip(&sim->plant, NULL, 1e-6 * (double)sim->time_us,
                      1e-6 * (double)sim->parameters.sensor.tip_period_us, random_uniform(&sim->chance_random));
     sensor_tip(&sim->parameters.sensor, &sim->plant.pose, sim->time_us, &sim->tip_random, &sample);
+    if (sim->plant.tip_repeats) {
+        memcpy(sample.position_m, sim->tip_measured.position_m, sizeof sample.position_m);
+        memcpy(sample.quaternion, sim->tip_measured.quaternion, sizeof sample.quaternion);
+    }
+    sim->tip_measured = sample;
     if (sim->faults.tip_stops) {
         return;
     }

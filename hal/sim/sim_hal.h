@@ -51,6 +51,7 @@ struct sim {
     float shown_pa[3];               /* readings of the last time */
     double drifted_pa[3];
     struct hal_tip_sample tip_shown; /* the last one */
+    struct hal_tip_sample tip_measured; /* the same before faults spoil it */
     struct random_stream fault_random;
     struct random_stream pressure_random[3];
     struct random_stream tip_random;

@@ -13,6 +13,7 @@
 #define CLOSED_LEAST 0.97
 /* By several, or by one of many forms: they can bend to much that they are not. */
 #define CLOSED_LEAST_BY_MANY 0.98
+#define CLOSED_LEAST_IN_DOUBT 0.95 /* by one whose law is in doubt, at least */
 #define FEW_PARTS 3
 #define AT_BOUND 1e-4        /* share of a parameter's range */
 #define SURE_ON_STRANGE 0.80 /* the same where another simulator errs in ways of its own */
@@ -97,7 +98,9 @@ static double least_closed(const struct diagnosis *diagnosis, const struct searc
     for (size_t e = 0; e < diagnosis->effects && diagnosis_is_strange(search); e++) {
         bends = bends || diagnosis->effect[e].kind->stage != EFFECT_STAGE_PRESSURE_SENSOR;
     }
-    return bends ? CLOSED_LEAST_BY_MANY : CLOSED_LEAST;
+    /* one whose law real causes need not follow leaves what that makes */
+    const double doubt = diagnosis->effects == 1 ? effect_doubt(diagnosis->effect[0].kind) : 0.0;
+    return bends ? CLOSED_LEAST_BY_MANY : fmax(fmin(CLOSED_LEAST, 1.0 - doubt * doubt), CLOSED_LEAST_IN_DOUBT);
 }
 
 static double pressure_squares(const struct fit *fit) {
@@ -249,6 +252,7 @@ bool diagnosis_conclude(struct diagnosis *diagnosis, struct search *search) {
     }
     diagnosis_doubt_floor(diagnosis, search);
     diagnosis_suggest(diagnosis);
+    diagnosis_temper(diagnosis, search);
     return dependence_find(&diagnosis->dependences, search,
                            diagnosis->verdict == GAP_UNKNOWN && search->best.model.count > 0);
 }

@@ -8,10 +8,14 @@
  * proportion to what is left of the gap, as an amplitude. Seen against effects of other forms. */
 #define FORM_SHARE 0.01
 #define FORM_BY_REST 1.3
-#define FREEZES_LAST 6.0    /* repeated samples come in runs, of about so many */
+#define FACTOR_MOST 3.0 /* of an interval, as a logarithm */
 #define BY_CHANCE_SURE 0.95 /* repeats are seen as such */
 #define GROUP_LEAST 0.15    /* belief that puts a name into the group */
 #define SLUGGISH_SHARE 0.7
+/* How often names that had no rival left were right, on data of another plant's causes; and, where an entry of the same
+ * stage was left out, as likely as one that nobody tried. */
+#define LISTED_SHARE 0.97
+#define UNTRIED_SHARE 0.5
 
 static void add_name(struct diagnosis *diagnosis, const char *name, double probability) {
     size_t at = diagnosis->group;
@@ -48,26 +52,30 @@ static double inflation(const struct search *search) {
 }
 
 /* `form`: what the form of the effect may be off by, one standard deviation. */
+static double spread_of(const struct search *search, size_t index, double form) {
+    const double variance = fmax(search->everything.covariance[index][index], 0.0);
+    return NINETY_PERCENT * sqrt(variance * inflation(search) + form * form);
+}
+
 static struct diagnosis_interval interval_of(const struct search *search, size_t index, double value,
                                              double form) {
-    const double variance = fmax(search->everything.covariance[index][index], 0.0);
-    const double spread = NINETY_PERCENT * sqrt(variance * inflation(search) + form * form);
+    const double spread = spread_of(search, index, form);
     return (struct diagnosis_interval){value, value - spread, value + spread};
 }
 
-/* How far the forms are seen to be off: what they leave of the gap, as an amplitude. */
-static double form_share(const struct diagnosis *diagnosis) {
+/* How far the forms are seen to be off, by what they leave of the gap as an amplitude, and how far this one may be off
+ * unseen: another law with other parameters can fit as well. */
+static double form_share(const struct diagnosis *diagnosis, double doubt) {
     const double left = fmax(diagnosis->structure[2], 0.0), all = fmax(diagnosis->structure[1], 1e-9);
-    return FORM_SHARE + FORM_BY_REST * fmin(sqrt(left / all), 1.0);
+    return hypot(FORM_SHARE + FORM_BY_REST * fmin(sqrt(left / all), 1.0), doubt);
 }
 
 /* A share of repeated samples is counted, not fitted. */
 static struct diagnosis_interval interval_of_share(const struct search *search, double share) {
-    double moving = 1.0;
-    for (size_t i = 0; i < search->data->runs; i++) {
-        moving += (double)search->data->run[i].tips_moving;
-    }
-    const double spread = NINETY_PERCENT * sqrt(share * (1.0 - share) * FREEZES_LAST / moving);
+    const struct gap_repeats repeats = gap_data_repeats(search->data);
+    /* repeats come in runs: of lengths spread as widely as their mean is long */
+    const double alone = fmax(repeats.samples, 1.0) / (2.0 * repeats.run_samples - 1.0);
+    const double spread = NINETY_PERCENT * sqrt(share * (1.0 - share) / alone);
     return (struct diagnosis_interval){share, fmax(share - spread, 0.0), fmin(share + spread, 1.0)};
 }
 
@@ -83,8 +91,16 @@ static struct diagnosis_interval interval_of_parameter(const struct diagnosis *d
         return (struct diagnosis_interval){isnan(parameter->none) ? value : parameter->none, parameter->least,
                                            parameter->most};
     }
-    const double size = value - (isnan(parameter->none) ? 0.0 : parameter->none);
-    return interval_of(search, index, value, form_share(diagnosis) * size);
+    const bool turns = strcmp(parameter->unit, "rad") == 0 && parameter->least < 0.0 && isnan(parameter->none);
+    const double none = isnan(parameter->none) ? 0.0 : parameter->none;
+    const double size = turns ? 1.0 : value - none; /* a bearing has no size: the radian */
+    const double spread = spread_of(search, index, form_share(diagnosis, effect->kind->doubt[i]) * size);
+    if (turns || parameter->least < none || !(size > 0.0)) {
+        return (struct diagnosis_interval){value, value - spread, value + spread};
+    }
+    /* what has one sign is doubted by a factor: as far down as up */
+    const double factor = exp(fmin(spread / size, FACTOR_MOST));
+    return (struct diagnosis_interval){value, none + size / factor, none + size * factor};
 }
 
 void diagnosis_take_effects(struct diagnosis *diagnosis, const struct search *search) {
@@ -229,4 +245,31 @@ void diagnosis_believe(struct diagnosis *diagnosis, const struct search *search)
         }
     }
     diagnosis->group = diagnosis->group > 1 ? diagnosis->group : 0;
+}
+
+static bool was_left_out(const struct search *search, const struct effect_kind *kind) {
+    bool left_out = false;
+    for (size_t k = 0; k < effect_kind_count(); k++) {
+        const struct effect_kind *other = effect_kind_at(k);
+        left_out = left_out || (other->stage == kind->stage && search_leaves_out(search, other->name));
+    }
+    return left_out;
+}
+
+/* The share of a belief among rivals that is left once the cause may be none of them: something that no entry of the
+ * catalogue is and that looks like one, or an entry beside it that was not to be tried. */
+static double share_of_listed(const struct search *search, const struct effect_kind *kind) {
+    return was_left_out(search, kind) ? UNTRIED_SHARE : LISTED_SHARE;
+}
+
+void diagnosis_temper(struct diagnosis *diagnosis, const struct search *search) {
+    for (size_t e = 0; e < diagnosis->effects; e++) {
+        diagnosis->effect[e].probability *= share_of_listed(search, diagnosis->effect[e].kind);
+    }
+    for (size_t i = 0; i < diagnosis->group; i++) {
+        diagnosis->group_probability[i] *= share_of_listed(search, effect_kind_find(diagnosis->group_name[i]));
+    }
+    for (size_t i = 0; i < diagnosis->alternatives; i++) {
+        diagnosis->alternative[i].probability *= share_of_listed(search, diagnosis->alternative[i].effect->kind);
+    }
 }

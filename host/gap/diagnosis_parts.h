@@ -16,6 +16,8 @@ bool diagnosis_measure(struct diagnosis *diagnosis, struct search *search);
 void diagnosis_take_effects(struct diagnosis *diagnosis, const struct search *search);
 /* How sure each of them is among its rivals, and the group of those that fit as well. */
 void diagnosis_believe(struct diagnosis *diagnosis, const struct search *search);
+/* Once the verdict is reached: beliefs among rivals become probabilities that leave room for what was not tried. */
+void diagnosis_temper(struct diagnosis *diagnosis, const struct search *search);
 /* By how much the pressure of a chamber moves, at most in one run. */
 double diagnosis_moves_pa(const struct gap_data *data, size_t chamber);
 /* Does another simulator move in a way that our table model cannot follow? It is then likely to err smoothly,

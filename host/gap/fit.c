@@ -9,6 +9,7 @@
 #define STIFFNESS_PRIOR 0.5      /* standard deviation of its logarithm: only where nothing else tells */
 #define SUPPLY_PRIOR 0.2
 #define DAMPING_FIRST 1e-3
+#define ATTEMPTS 5
 #define REBASES 4
 #define MOVED_LITTLE 1e-3         /* of the nominal scales: a base tells of that exactly enough */
 #define ENOUGH 2e-4              /* relative change of the sum of squares that is worth no further step */
@@ -414,15 +415,17 @@ static void set_covariance(const struct normal *normal, const bool *is_free, str
 static void find_free(const struct gap_parameter *parameter, const struct normal *normal, bool fit_nominal, bool *is_free) {
     for (size_t i = 0; i < normal->size; i++) {
         const double value = *parameter[i].value;
-        const bool low = value <= parameter[i].least && normal->gradient[i] > 0.0;
-        const bool high = value >= parameter[i].most && normal->gradient[i] < 0.0;
+        const bool low = !parameter[i].turns && value <= parameter[i].least && normal->gradient[i] > 0.0;
+        const bool high = !parameter[i].turns && value >= parameter[i].most && normal->gradient[i] < 0.0;
         is_free[i] = !low && !high && (i >= 2 || fit_nominal) && normal->matrix[i][i] > 0.0;
     }
 }
 
 static void take_step(const struct gap_parameter *parameter, size_t count, const double *step) {
     for (size_t i = 0; i < count; i++) {
-        *parameter[i].value = fmin(fmax(*parameter[i].value + step[i], parameter[i].least), parameter[i].most);
+        const double value = *parameter[i].value + step[i], turn = parameter[i].most - parameter[i].least;
+        *parameter[i].value = parameter[i].turns ? value - turn * floor((value - parameter[i].least) / turn)
+                                                 : fmin(fmax(value, parameter[i].least), parameter[i].most);
     }
 }
 
@@ -451,6 +454,18 @@ void fitter_linear(struct fitter *fitter, const struct fit_base *base, const dou
     }
 }
 
+double fitter_gain(struct fitter *fitter, const struct gap_model *model, double *share) {
+    double product = 0.0, square = 0.0;
+    evaluate_into(fitter, model, &fitter->trial, fitter->moved);
+    for (size_t k = 0; k < fitter->replay->residuals; k++) {
+        const double change = counts(fitter, k) ? fitter->moved[k] - fitter->residual[k] : 0.0;
+        product -= change * fitter->residual[k];
+        square += change * change;
+    }
+    *share = square > 0.0 ? product / square : 0.0;
+    return *share * fabs(product);
+}
+
 void fitter_run(struct fitter *fitter, struct fit *fit, int rounds, bool fit_nominal) {
     struct gap_parameter parameter[GAP_PARAMETERS_MAX];
     struct gap_model *model = &fit->model;
@@ -477,7 +492,7 @@ void fitter_run(struct fitter *fitter, struct fit *fit, int rounds, bool fit_nom
         }
         bool better = false;
         double gain = 0.0;
-        for (int attempt = 0; attempt < 5 && !better; attempt++) {
+        for (int attempt = 0; attempt < ATTEMPTS && !better; attempt++) {
             double step[GAP_PARAMETERS_MAX];
             const struct gap_model kept = *model;
             if (solve(&normal, is_free, damping, step)) {

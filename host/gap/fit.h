@@ -71,6 +71,9 @@ bool fit_rebased(const struct replay *fine, const struct replay *coarse, struct 
  * one [1..3] at some size; negative where only the opposite effect would help. */
 void fitter_linear(struct fitter *fitter, const struct fit_base *base, const double *base_residual,
                    const struct effect *effect, double gain[4]);
+/* By how much the squares that are fitted would shrink from the model last evaluated, to first order, were its change to `model`
+ * taken `share` times, which is set to what does best. */
+double fitter_gain(struct fitter *fitter, const struct gap_model *model, double *share);
 /* Squares over pressure and tip, fitted or held out; how many; and their mean. */
 double fit_squares(const struct fit_sums *sums, int held_out);
 double fit_count(const struct fit_sums *sums, int held_out);

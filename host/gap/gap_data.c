@@ -11,9 +11,14 @@
 #include "safety/supervisor.h"
 
 #define UNIT_TOLERANCE 0.05  /* of a quaternion's length */
-#define MOVING_LEAST 20     /* samples that say anything */
-#define WINDOW 5             /* samples on either side .. */
-#define MOVED_M 3e-3         /* .. over which the tip moves so far that an exact repeat is no coincidence of the steps */
+#define TELLING_LEAST 20    /* samples that say anything */
+#define WINDOW 15            /* samples on either side: longer than repeats go on .. */
+#define MOVED_M 6e-3         /* .. over which the tip moves so far that an exact repeat is no coincidence of the steps */
+#define FINE_LEAST 100       /* pairs of samples that tell whether steps are fine */
+#define FINE_SHARE 0.01      /* of their coordinates that are the same */
+#define ONSET_STEP_S 0.1     /* an onset of repeats is not sought closer than that */
+#define ONSET_GAIN 12.0      /* by so much the logarithm of the likelihood speaks for it */
+#define ONSET_BEFORE 0.1     /* share of repeats before it, of that after, at most */
 
 static double cell(const struct run_log *log, size_t row, int column) {
     return column < 0 ? NAN : log->value[row * log->columns + (size_t)column];
@@ -93,13 +98,27 @@ static bool is_moving(const struct gap_run *run, size_t i) {
     return moved > MOVED_M;
 }
 
-static void count_repeats(struct gap_run *run) {
+/* Coordinates that come back one by one are those of a sensor with coarse steps, which may also all come back at once. */
+static bool has_fine_steps(const struct gap_run *run) {
+    size_t pairs = 0, same = 0;
     for (size_t i = 1; i < run->tips; i++) {
-        struct gap_tip *tip = &run->tip[i];
-        tip->repeated = is_repeat(tip, &run->tip[i - 1]);
-        const bool moves = is_moving(run, i);
-        run->tips_moving += moves;
-        run->tips_repeated += moves && tip->repeated;
+        if (!run->tip[i].repeated) {
+            pairs++;
+            for (size_t k = 0; k < 3; k++) {
+                same += run->tip[i].position_m[k] == run->tip[i - 1].position_m[k] ? 1 : 0;
+            }
+        }
+    }
+    return pairs >= FINE_LEAST && (double)same < FINE_SHARE * 3.0 * (double)pairs;
+}
+
+static void find_repeats(struct gap_run *run) {
+    for (size_t i = 1; i < run->tips; i++) {
+        run->tip[i].repeated = is_repeat(&run->tip[i], &run->tip[i - 1]);
+    }
+    const bool fine = has_fine_steps(run);
+    for (size_t i = 1; i < run->tips; i++) {
+        run->tip[i].telling = fine || is_moving(run, i);
     }
 }
 
@@ -190,7 +209,7 @@ static bool take_log(struct gap_run *run, const struct run_log *log, char *error
     for (size_t row = 0; row < log->rows; row++) {
         run->tips += take_tip(run, log, row, tip_column);
     }
-    count_repeats(run);
+    find_repeats(run);
     find_cuts(run, log);
     if (!find_breaks(run, log)) {
         return out_of_memory(run, error, error_bytes);
@@ -228,13 +247,60 @@ bool gap_data_read(struct gap_data *data, const char *const *paths, size_t count
     return true;
 }
 
-double gap_data_repeated_share(const struct gap_data *data) {
-    size_t moving = 0, repeated = 0;
+/* --- repeated samples --- */
+
+struct repeat_count {
+    double samples;
+    double repeats;
+    double runs; /* of repeats without another sample between */
+};
+
+static struct repeat_count count_since(const struct gap_data *data, double since_s, double until_s) {
+    struct repeat_count count = {0.0, 0.0, 0.0};
     for (size_t i = 0; i < data->runs; i++) {
-        moving += data->run[i].tips_moving;
-        repeated += data->run[i].tips_repeated;
+        const struct gap_run *run = &data->run[i];
+        for (size_t t = 0; t < run->tips; t++) {
+            const struct gap_tip *tip = &run->tip[t];
+            if (tip->telling && tip->time_s >= since_s && tip->time_s < until_s) {
+                count.samples += 1.0;
+                count.repeats += tip->repeated ? 1.0 : 0.0;
+                count.runs += tip->repeated && t > 0 && !run->tip[t - 1].repeated ? 1.0 : 0.0;
+            }
+        }
     }
-    return moving >= MOVING_LEAST ? (double)repeated / (double)moving : 0.0;
+    return count;
+}
+
+static double log_likelihood(const struct repeat_count *count) {
+    const double share = fmin(fmax(count->repeats / fmax(count->samples, 1.0), 1e-4), 1.0 - 1e-4);
+    return count->repeats * log(share) + (count->samples - count->repeats) * log1p(-share);
+}
+
+struct gap_repeats gap_data_repeats(const struct gap_data *data) {
+    const struct repeat_count all = count_since(data, -INFINITY, INFINITY);
+    struct repeat_count after = all;
+    double most = 0.0, onset_s = 0.0, last_s = 0.0;
+    for (size_t i = 0; i < data->runs; i++) {
+        const struct gap_run *run = &data->run[i];
+        last_s = run->tips > 0 ? fmax(last_s, run->tip[run->tips - 1].time_s) : last_s;
+    }
+    const double run_samples = fmax(all.repeats / fmax(all.runs, 1.0), 1.0);
+    const int steps = (int)fmin(last_s / ONSET_STEP_S, 1e5);
+    for (int step = 1; step < steps && all.repeats >= TELLING_LEAST; step++) {
+        const double at_s = step * ONSET_STEP_S;
+        const struct repeat_count early = count_since(data, -INFINITY, at_s), late = count_since(data, at_s, INFINITY);
+        /* what comes in runs says less */
+        const double gain = (log_likelihood(&early) + log_likelihood(&late) - log_likelihood(&all)) / run_samples;
+        const bool rare = early.repeats * late.samples < ONSET_BEFORE * late.repeats * early.samples;
+        if (rare && early.samples >= TELLING_LEAST && late.samples >= TELLING_LEAST && gain > fmax(most, ONSET_GAIN)) {
+            most = gain;
+            onset_s = at_s;
+            after = late;
+        }
+    }
+    const bool enough = after.samples >= TELLING_LEAST;
+    return (struct gap_repeats){onset_s, enough ? after.repeats / after.samples : 0.0, after.samples,
+                                fmax(after.repeats / fmax(after.runs, 1.0), 1.0)};
 }
 
 void gap_data_free(struct gap_data *data) {

@@ -14,7 +14,8 @@ struct gap_tip {
     double time_s;        /* when the pose was true: the row's time less the sensor's nominal age */
     double position_m[3];
     double quaternion[4]; /* w, x, y, z; NAN where only the position was measured */
-    bool repeated;        /* the same words as the sample before */
+    bool repeated;        /* the same words as the sample before .. */
+    bool telling;         /* .. which is then no coincidence: the tip moves, or the log shows finer steps than its noise */
 };
 
 /* The tip in the base frame; the quaternion NAN where only the position is known. */
@@ -48,8 +49,6 @@ struct gap_run {
     size_t tips;
     struct gap_tip *tip;
     size_t tips_skipped;   /* with a status bit set, or a quaternion that is none */
-    size_t tips_moving;    /* samples taken while the tip moved .. */
-    size_t tips_repeated;  /* .. and which of them repeat the one before */
     struct gap_simulator *simulator; /* another simulator's columns (gap/baseline.h); NULL: there are none */
     /* Only while another simulator is the baseline: */
     double *sim_pa;            /* [rows * 3] its chamber pressures, without holes; NULL: it gives none */
@@ -69,8 +68,14 @@ struct gap_data {
 
 /* Reads the logs; the baseline is our own replay. False: `error` names file, line, column and remedy. */
 bool gap_data_read(struct gap_data *data, const char *const *paths, size_t count, char *error, size_t error_bytes);
-/* Share of repeated samples among those taken while the tip moved, over all runs. */
-double gap_data_repeated_share(const struct gap_data *data);
+/* Samples that repeat the one before, among those where a repeat is no coincidence, over all runs. */
+struct gap_repeats {
+    double onset_s;  /* hardly any came before, in any run; 0: from the start */
+    double share;    /* of the samples since then */
+    double samples;  /* since then */
+    double run_samples; /* how long repeats go on, mean */
+};
+struct gap_repeats gap_data_repeats(const struct gap_data *data);
 void gap_data_free(struct gap_data *data);
 /* Seconds from the first row to the last, over all runs. */
 double gap_data_duration_s(const struct gap_data *data);

@@ -7,6 +7,7 @@
 #define STIFFNESS_MOST 2.5
 #define SUPPLY_LEAST 0.6
 #define SUPPLY_MOST 1.5
+#define FULL_TURN_RAD (2.0 * M_PI)
 
 static double scale_of(const struct effect_parameter *parameter) {
     const double from_none = isnan(parameter->none) ? 0.0 : fabs(parameter->typical - parameter->none);
@@ -19,15 +20,16 @@ static double scale_of(const struct effect_parameter *parameter) {
 size_t gap_model_parameters(struct gap_model *model, struct gap_parameter parameter[GAP_PARAMETERS_MAX]) {
     size_t count = 0;
     parameter[count++] = (struct gap_parameter){
-        "stiffness_scale", "1", STIFFNESS_LEAST, STIFFNESS_MOST, 0.05, &model->stiffness_scale, -1};
+        "stiffness_scale", "1", STIFFNESS_LEAST, STIFFNESS_MOST, 0.05, &model->stiffness_scale, -1, false};
     parameter[count++] =
-        (struct gap_parameter){"supply_scale", "1", SUPPLY_LEAST, SUPPLY_MOST, 0.05, &model->supply_scale, -1};
+        (struct gap_parameter){"supply_scale", "1", SUPPLY_LEAST, SUPPLY_MOST, 0.05, &model->supply_scale, -1, false};
     for (size_t e = 0; e < model->count; e++) {
         struct effect *effect = &model->effect[e];
         for (size_t i = effect->kind->by_chance ? 1 : 0; i < effect->kind->parameter_count; i++) {
             const struct effect_parameter *kind = &effect->kind->parameter[i];
+            const bool turns = strcmp(kind->unit, "rad") == 0 && kind->most - kind->least > FULL_TURN_RAD - 1e-9;
             parameter[count++] = (struct gap_parameter){
-                kind->name, kind->unit, kind->least, kind->most, scale_of(kind), &effect->parameter[i], (int)e};
+                kind->name, kind->unit, kind->least, kind->most, scale_of(kind), &effect->parameter[i], (int)e, turns};
         }
     }
     return count;

@@ -23,6 +23,7 @@ struct gap_parameter {
     double scale; /* a change of this size matters */
     double *value;
     int effect; /* -1: nominal */
+    bool turns; /* a full turn's angle: from its bounds it goes on at the other end */
 };
 
 /* Fills `parameter`; returns how many. Parameters that data cannot move (probabilities) are left out. */

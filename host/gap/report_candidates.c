@@ -125,7 +125,7 @@ static struct recorded what_is_recorded(const struct gap_data *data) {
     for (size_t i = 0; i < data->runs; i++) {
         has.duties = has.duties && data->run[i].has_duty;
         has.readings = has.readings && data->run[i].has_reading;
-        has.repeats = gap_data_repeated_share(data) > 0.02;
+        has.repeats = gap_data_repeats(data).share > 0.02;
     }
     return has;
 }

@@ -9,6 +9,9 @@
 
 #define ROUNDS 8
 #define FORM_SHARE 0.002 /* of what an effect takes off */
+/* Of what the best leaves: of two laws that are both off, the one that is off by less is seldom the wrong one. */
+#define REST_SHARE 0.25
+/* A parameter takes off a noise's square by chance, and fits the noise for as much (Akaike 1974). */
 #define NOISE_SQUARES 10.0
 
 static double held_out(const struct fit *fit) {
@@ -165,16 +168,17 @@ static double misfit(const struct rivals *rivals, const struct fit *rival, const
     const double noise = fmax(squares_of(least, group) / count - structure, 0.1);
     const double taken_off = fmax(squares_of(without, group) - squares_of(least, group), 0.0);
     return (squares_of(rival, group) - squares_of(least, group)) /
-           (FORM_SHARE * taken_off + structure * count + NOISE_SQUARES * noise);
+           (FORM_SHARE * taken_off + REST_SHARE * structure * count + NOISE_SQUARES * noise);
 }
 
 static void weigh(struct rivals *rivals, const struct fit *without, const struct fit *best) {
     double sum = 0.0, most = -INFINITY;
     for (size_t i = 0; i < rivals->count; i++) {
         struct rival *rival = &rivals->rival[i];
+        const double parameters = parameters_of(&rival->fit.model, rival->kind);
         rival->belief = -misfit(rivals, &rival->fit, without, best, FIT_PRESSURE) -
                         misfit(rivals, &rival->fit, without, best, FIT_TIP) -
-                        0.5 * log(parameters_of(&rival->fit.model, rival->kind));
+                        0.5 * log(parameters) - parameters / NOISE_SQUARES;
         most = fmax(most, rival->belief);
     }
     for (size_t i = 0; i < rivals->count; i++) {

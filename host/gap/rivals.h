@@ -25,9 +25,10 @@ struct search;
 
 /* Fits the rivals of each kind that search->best names. Fills search->rivals and search->rivals_count. False: out of memory.
  *
- * A kind is believed in proportion to exp(-sum of (squares - best one's) / scale) / sqrt(parameters), over pressures and tip. The
- * scale is what noise makes of the squares, plus a five hundredth of what the effect takes off, for what the form of a right
- * effect may be off by, plus what the best there leaves beyond noise, by which forms are seen to be off. */
+ * A kind is believed in proportion to exp(-sum of (squares - best one's) / scale - parameters / 10) / sqrt(parameters), over
+ * pressures and tip; the tenth is what a parameter fits of noise by chance (Akaike 1974), on that scale. The scale is ten times
+ * what noise makes of the squares, plus a five hundredth of what the effect takes off, for what the form of a right effect may be
+ * off by, plus a quarter of what the best there leaves beyond noise, by which forms are seen to be off. */
 bool rivals_find(struct search *search);
 
 #endif

@@ -5,7 +5,8 @@
 
 #define REPEATS_CERTAIN 0.04 /* share of repeated samples that no noise makes */
 #define REVISIONS 3
-#define DISBELIEVED 0.1 /* an effect that its rivals leave so little belief gives way to the best of them */
+#define DISBELIEVED 0.1 /* an effect that its rivals leave so little belief gives way to the best of them, .. */
+#define BELIEVED 0.65   /* .. or to one that would be the verdict */
 #define DOUBTED 0.65    /* a further effect that its rivals leave less is left out, if the others .. */
 #define EXPLAINED_SHARE 0.03 /* .. leave no more than that of the gap by themselves */
 
@@ -21,16 +22,17 @@ static bool prepare(struct search *search) {
  * by them: a log that is written more often than the sensor measures has them too. */
 static bool take_repeats(struct search *search, size_t step) {
     const struct effect_kind *kind = effect_kind_find("tip_freeze");
-    const double share = gap_data_repeated_share(search->data);
+    const struct gap_repeats repeats = gap_data_repeats(search->data);
     const bool known = kind == NULL || search_leaves_out(search, kind->name) ||
                        gap_model_has(&search->best.model, kind, 0, 0);
-    if (known || share < REPEATS_CERTAIN || search->best.model.count == GAP_EFFECTS_MAX) {
+    if (known || repeats.share < REPEATS_CERTAIN || search->best.model.count == GAP_EFFECTS_MAX) {
         return true;
     }
     struct effect effect;
     struct fit with = search->best;
     effect_init(&effect, kind);
-    effect.parameter[0] = share;
+    effect.parameter[0] = repeats.share;
+    effect.onset_s = repeats.onset_s;
     gap_model_add(&with.model, &effect);
     const bool sound = search_recalibrate(search, &with, true);
     if (sound && search_held_out(&with) < search_held_out(&search->best) - search_gain_by_noise(&with)) {
@@ -112,7 +114,8 @@ static const struct fit *ask_rivals(const struct search *search) {
     for (size_t r = 0; r < search->rivals_count; r++) {
         const struct rivals *rivals = &search->rivals[r];
         const bool by_chance = search->best.model.effect[rivals->place].kind->by_chance;
-        if (!by_chance && rivals->count > 1 && belief_in_held(search, rivals) < DISBELIEVED) {
+        const double held = belief_in_held(search, rivals), best = rivals->rival[0].belief;
+        if (!by_chance && rivals->count > 1 && (held < DISBELIEVED || (held < best && best > BELIEVED))) {
             return &rivals->rival[0].fit;
         }
     }

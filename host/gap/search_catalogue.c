@@ -41,7 +41,7 @@ static bool can_show(const struct gap_data *data, const struct effect_kind *kind
         return false;
     }
     if (kind->by_chance) {
-        return gap_data_repeated_share(data) > REPEATS_LEAST;
+        return gap_data_repeats(data).share > REPEATS_LEAST;
     }
     if (gap_effect_downstream(kind)) {
         return tips;
@@ -99,13 +99,14 @@ static double within(const struct effect_parameter *parameter, double share) {
 
 size_t search_place_start(const struct effect_kind *kind, size_t k, struct effect *effect) {
     static const size_t bases[EFFECT_PARAMETERS_MAX] = {2, 3, 5};
-    bool sign = false, secondary = false;
+    bool sign = false;
+    size_t secondary = 0;
     for (size_t i = 0; i < kind->parameter_count; i++) {
         const struct effect_parameter *parameter = &kind->parameter[i];
         const double mirrored = 2.0 * parameter->none - parameter->typical;
         sign =
             sign || (!isnan(parameter->none) && mirrored >= parameter->least && mirrored <= parameter->most);
-        secondary = secondary || isnan(parameter->none);
+        secondary += isnan(parameter->none) ? 1 : 0;
     }
     for (size_t i = 0; i < kind->parameter_count && k > 0; i++) {
         const struct effect_parameter *parameter = &kind->parameter[i];
@@ -118,7 +119,7 @@ size_t search_place_start(const struct effect_kind *kind, size_t k, struct effec
             effect->parameter[i] = within(parameter, 0.1 + 0.8 * spread(k, bases[i]));
         }
     }
-    if (k == 1 && !sign && !secondary) { /* a small one: some are felt only in proportion near none */
+    if (k == 1 && !sign && secondary == 0) { /* a small one: some are felt only in proportion near none */
         effect->parameter[0] =
             kind->parameter[0].none + SMALL_SHARE * (kind->parameter[0].typical - kind->parameter[0].none);
     }
@@ -128,5 +129,8 @@ size_t search_place_start(const struct effect_kind *kind, size_t k, struct effec
             kind->parameter[0].none + share[k] * (kind->parameter[0].typical - kind->parameter[0].none);
         return THRESHOLD_STARTS;
     }
-    return !secondary ? 2 : search_needs_gas(kind) ? STARTS_MAX : STARTS_CHEAP;
+    if (secondary == 0) {
+        return 2;
+    }
+    return search_needs_gas(kind) ? STARTS_MAX : secondary > 1 ? SEARCH_STARTS_PLACED : STARTS_CHEAP;
 }

@@ -7,15 +7,24 @@
 #define COMPLETING_SHARE 0.5 /* of what is left, that a further effect must explain */
 /* Shares of the gap, in pressures or at the tip: */
 #define POLISH_SHARE 0.025  /* less than that is left by any form of the right effect, .. */
+#define EXACT_SHARE 0.01    /* .. less than that by effects that have but one form, .. */
 #define FORM_LEAST 0.0005   /* .. less than that by most forms of it, .. */
 #define TRACE_LEAST 0.00005 /* .. and less than that by all: no effect is sought for it */
 /* Shares of the whole gap: */
 #define MATERIAL_SHARE 0.0003 /* less than that, elsewhere than the gap lies, is form, .. */
 #define ELSEWHERE_SHARE 3e-5  /* .. down to that, if no simple effect explains it whole */
+#define LAW_AT_TIP 0.2      /* of a law's doubt: what it leaves at the tip, where six coordinates hold it */
 #define WHOLE_SHARE 0.95      /* of such a small rest, that an effect must explain, .. */
+#define UNEXPLAINED_MOST 0.1  /* .. but for what its own law may leave, at most that, .. */
 #define TRACE_SHARE 0.98      /* .. and of a trace, .. */
 #define TRACE_SIGNAL 10.0     /* .. which is so many times what is worth explaining at all */
-#define FAINT_LEFT 0.25       /* of a faint gap: more than that left means that something else was meant */
+/* Of pressures that no effect acts on yet: so much is no form's doing, and an effect must explain all but that. */
+#define UNTOUCHED_LEAST 0.1
+#define UNTOUCHED_LEFT 0.15
+/* Of a faint gap: more than that left means that something else was meant, but for what chance makes of so little. */
+#define FAINT_LEFT 0.25
+#define FAINT_LEFT_BY_CHANCE 0.4
+#define FAINT_REST 0.1 /* mean square */
 
 double search_held_out(const struct fit *fit) {
     return fit->sound ? fit_squares(&fit->sums, 1) : INFINITY;
@@ -77,12 +86,45 @@ static size_t added(const struct fit *before, const struct fit *after) {
     return parts_of(before, after->model.effect[place].kind) > 0 ? after->model.count - 1 : place;
 }
 
+/* What the laws of the model's effects may leave in a group by being other than the real causes' own: that of their sizes, as a
+ * share of squares. Where pressures are measured, what acts before them errs there, and no longer at the tip. */
+static double form_share(const struct fit *fit, enum fit_group group) {
+    const bool measured = fit->sums.part[1][FIT_PRESSURE].count > 0.0;
+    double most = 0.0;
+    for (size_t e = 0; e < fit->model.count; e++) {
+        const struct effect_kind *kind = fit->model.effect[e].kind;
+        const double doubt = effect_doubt(kind) * (group == FIT_TIP ? LAW_AT_TIP : 1.0);
+        const bool here = gap_effect_upstream(kind) ? group == FIT_PRESSURE || !measured : group == FIT_TIP;
+        most = here ? fmax(most, doubt * doubt) : most;
+    }
+    return fmin(most, POLISH_SHARE);
+}
+
+static bool acts_on_pressures(const struct gap_model *model) {
+    bool acts = false;
+    for (size_t e = 0; e < model->count; e++) {
+        acts = acts || gap_effect_upstream(model->effect[e].kind);
+    }
+    return acts;
+}
+
+/* Geometry and timing of sensors have no other form than theirs. */
+static bool is_exact(const struct gap_model *model) {
+    bool exact = true;
+    for (size_t e = 0; e < model->count; e++) {
+        const struct effect_kind *kind = model->effect[e].kind;
+        exact = exact && kind->stage == EFFECT_STAGE_TIP_SENSOR && kind->forms < 2;
+    }
+    return exact;
+}
+
 /* A further effect must be the rest of the explanation, of the pressures or of the tip; not polish on a form
  * that only nearly fits. A small rest may as well be the form: of that, a simple effect must explain nearly
  * all, as no form's error is likely to be just what another effect does. */
 static bool completes(const struct search *search, const struct fit *before, const struct fit *after) {
     const struct effect_kind *kind = after->model.effect[added(before, after)].kind;
     const bool simple = parts_of(after, kind) == 1;
+    const double law = effect_doubt(kind), unexplained = fmin(fmax(1.0 - WHOLE_SHARE, law * law), UNEXPLAINED_MOST);
     bool any = false;
     for (int g = gap_effect_upstream(kind) ? FIT_PRESSURE : FIT_TIP; g < FIT_GROUPS; g++) {
         const enum fit_group group = (enum fit_group)g;
@@ -90,11 +132,15 @@ static bool completes(const struct search *search, const struct fit *before, con
                      then = fit_structure_of(&after->sums, 1, group);
         const bool halves = then < (1.0 - COMPLETING_SHARE) * left;
         const bool whole =
-            left > 3.0 * STRUCTURE_LEAST && then < fmax((1.0 - WHOLE_SHARE) * left, STRUCTURE_LEAST);
+            left > 3.0 * STRUCTURE_LEAST && then < fmax(unexplained * left, STRUCTURE_LEAST);
         const bool trace = left > TRACE_SIGNAL * STRUCTURE_LEAST && then < (1.0 - TRACE_SHARE) * left;
-        any = any || (is_left(search, before, group, POLISH_SHARE, MATERIAL_SHARE) && halves) ||
-              (simple && ((is_left(search, before, group, FORM_LEAST, ELSEWHERE_SHARE) && whole) ||
-                          (is_left(search, before, group, TRACE_LEAST, ELSEWHERE_SHARE) && trace)));
+        const double form = form_share(before, group);
+        const bool untouched = group == FIT_PRESSURE && !acts_on_pressures(&before->model) && left > UNTOUCHED_LEAST &&
+                               then < UNTOUCHED_LEFT * left;
+        const double polish = is_exact(&before->model) ? EXACT_SHARE : POLISH_SHARE;
+        any = any || (simple && untouched) || (is_left(search, before, group, polish, MATERIAL_SHARE) && halves) ||
+              (simple && ((is_left(search, before, group, fmax(FORM_LEAST, form), ELSEWHERE_SHARE) && whole) ||
+                          (is_left(search, before, group, fmax(TRACE_LEAST, form), ELSEWHERE_SHARE) && trace)));
     }
     return any;
 }
@@ -114,7 +160,9 @@ static bool repeats_kind(const struct gap_model *model) {
 
 bool search_earns_place(const struct search *search, const struct fit *before, const struct fit *after) {
     if (before->model.count == 0) {
-        const bool all_of_it = search_structure(after) < FAINT_LEFT * search_structure(before);
+        const double faint = search_structure(before);
+        const bool all_of_it =
+            search_structure(after) < fmax(FAINT_LEFT * faint, fmin(FAINT_LEFT_BY_CHANCE * faint, FAINT_REST));
         return search_is_better(before, after) && (all_of_it || search_structure(before) > FAINT);
     }
     const size_t place = added(before, after);

@@ -50,6 +50,24 @@ static const struct fit *try_onsets(struct search_crew *crew, const struct fit *
     return &trial[best];
 }
 
+/* Without its onset an effect's forms are all off, and the best of them may be the wrong one: the others from there, too. */
+static void try_other_forms(struct search_crew *crew, size_t e, struct fit *fit) {
+    const struct fit start = *fit;
+    const struct effect *own = &start.model.effect[e];
+    for (size_t form = 0; form < own->kind->forms && !own->kind->forms_add; form++) {
+        struct fit trial = start;
+        struct effect *other = &trial.model.effect[e];
+        effect_init(other, own->kind);
+        other->form = form;
+        other->chamber = own->chamber;
+        other->onset_s = own->onset_s;
+        if (form != own->form) {
+            fitter_run(&crew->fitter[0], &trial, REFINE_ROUNDS, true);
+            *fit = all_squares(&trial) < all_squares(fit) ? trial : *fit;
+        }
+    }
+}
+
 /* When did each effect set in? Tried on a grid, then closer and closer; kept where it explains more. */
 static void find_onset(struct search_crew *crew, double end_s, size_t e, struct fit *fit) {
     struct fit trial[ONSETS];
@@ -72,6 +90,8 @@ static void find_onset(struct search_crew *crew, double end_s, size_t e, struct 
     if (before.model.effect[e].onset_s == 0.0 &&
         search_structure(fit) > ONSET_LEAVES * search_structure(&before)) {
         *fit = before;
+    } else {
+        try_other_forms(crew, e, fit);
     }
 }
 

@@ -9,6 +9,8 @@
 #include "gap/search.h"
 
 #define PAIRED_MAX 6        /* the best alone, of which all pairs are tried */
+/* Starts of an effect of which several parameters say where or which way: too many to fit from each. */
+#define SEARCH_STARTS_PLACED 128
 #define REFINE_ROUNDS 6     /* of a fit in earnest */
 #define STRUCTURE_LEAST 0.2 /* mean square in units of a block's noise that is worth explaining */
 #define FAINT 1.5 /* mean square below which a first effect, too, must explain most of what there is */

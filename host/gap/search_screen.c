@@ -8,6 +8,7 @@
 #define SCREEN_ROUNDS 1
 #define SCREEN_ROUNDS_CHEAP 3
 #define THRESHOLD_ROUNDS 2
+#define STARTS_KEPT 4 /* of many that an evaluation each tells apart */
 #define SETTLED_MAX 5 /* of the refined ones, the best, from a base of their own .. */
 #define SETTLE_ROUNDS 4
 #define REFINED_GAS_MAX 8  /* of the screened candidates that need gas replayed */
@@ -33,21 +34,66 @@ static void put_best_first(struct fit **order, size_t count) {
 
 /* --- coarsely --- */
 
-static void screen_one(struct fitter *fitter, const struct search *search, const struct gap_model *onto,
-                       const struct search_candidate *candidate, struct fit *best) {
-    const int rounds = search_needs_gas(candidate->kind) ? SCREEN_ROUNDS : SCREEN_ROUNDS_CHEAP;
-    size_t starts = 1;
-    *best = (struct fit){.sound = false};
-    for (size_t k = 0; k < starts; k++) {
-        struct fit fit = {.model = *onto};
+/* Of many starts the few that promise most, each at the size that does best; returns how many. The size: what is gone at
+ * `none`. */
+static size_t place_starts(struct fitter *fitter, const struct search *search, const struct gap_model *onto,
+                           const struct search_candidate *candidate, struct effect starts[STARTS_KEPT]) {
+    double gains[STARTS_KEPT] = {0.0};
+    size_t kept = 0;
+    fitter_evaluate(fitter, onto);
+    for (size_t k = 0; k < SEARCH_STARTS_PLACED; k++) {
+        struct gap_model model = *onto;
         struct effect effect;
+        double share;
         effect_init(&effect, candidate->kind);
         effect.chamber = candidate->chamber;
         effect.form = candidate->form;
         effect.onset_s = search->onset_s;
-        starts = search_place_start(candidate->kind, k, &effect);
+        (void)search_place_start(candidate->kind, k, &effect);
+        gap_model_add(&model, &effect);
+        const double gain = fitter_gain(fitter, &model, &share);
+        if (!(gain > 0.0) || (kept == STARTS_KEPT && gain <= gains[kept - 1])) {
+            continue;
+        }
+        for (size_t i = 0; i < effect.kind->parameter_count; i++) {
+            const struct effect_parameter *parameter = &effect.kind->parameter[i];
+            if (!isnan(parameter->none)) {
+                const double size = parameter->none + share * (effect.parameter[i] - parameter->none);
+                effect.parameter[i] = fmin(fmax(size, parameter->least), parameter->most);
+            }
+        }
+        size_t at = kept < STARTS_KEPT ? kept++ : kept - 1;
+        for (; at > 0 && gains[at - 1] < gain; at--) {
+            gains[at] = gains[at - 1];
+            starts[at] = starts[at - 1];
+        }
+        gains[at] = gain;
+        starts[at] = effect;
+    }
+    return kept;
+}
+
+static void screen_one(struct fitter *fitter, const struct search *search, const struct gap_model *onto,
+                       const struct search_candidate *candidate, struct fit *best) {
+    const int rounds = search_needs_gas(candidate->kind) ? SCREEN_ROUNDS : SCREEN_ROUNDS_CHEAP;
+    struct effect placed[STARTS_KEPT], effect;
+    effect_init(&effect, candidate->kind);
+    size_t starts = search_place_start(candidate->kind, 0, &effect);
+    const bool many = starts == SEARCH_STARTS_PLACED;
+    starts = many ? place_starts(fitter, search, onto, candidate, placed) : starts;
+    *best = (struct fit){.sound = false};
+    for (size_t k = 0; k < starts; k++) {
+        struct fit fit = {.model = *onto};
+        effect_init(&effect, candidate->kind);
+        effect.chamber = candidate->chamber;
+        effect.form = candidate->form;
+        effect.onset_s = search->onset_s;
+        (void)search_place_start(candidate->kind, k, &effect);
+        effect = many ? placed[k] : effect;
         if (candidate->kind->by_chance) {
-            effect.parameter[0] = gap_data_repeated_share(search->data);
+            const struct gap_repeats repeats = gap_data_repeats(search->data);
+            effect.parameter[0] = repeats.share;
+            effect.onset_s = fmax(effect.onset_s, repeats.onset_s);
         }
         const bool all_forms = candidate->form > 0 && candidate->form == candidate->kind->forms;
         effect.form = all_forms ? 0 : effect.form;

@@ -462,6 +462,51 @@ static void flow_and_volume_scale_the_time_of_filling_and_venting(void **state) 
     }
 }
 
+/* Flow through the nominal valve, in units of the choked one at one pascal. */
+static double valve_alone(const struct gas_parameters *gas, double up_pa, double down_pa) {
+    return gas_mass_flow(gas, 1.0 / gas->reference_density_kgpm3, up_pa, down_pa);
+}
+
+/* A laminar line's drop is its flow times a constant, and in series with the valve both pass the same: whatever the pressures
+ * and the direction, the constant that the passed share implies is one. */
+static void a_laminar_line_has_one_resistance_at_all_pressures(void **state) {
+    (void)state;
+    struct plant_parameters parameters;
+    plant_default_parameters(&parameters);
+    const struct gas_parameters *gas = &parameters.gas;
+    static const double chambers_pa[] = {300.0, 2000.0, 6000.0, 10000.0, 20000.0};
+    for (int tenths = 2; tenths <= 9; tenths++) {
+        struct effect effect = make("line_resistance:form=1");
+        double least = INFINITY, most = 0.0;
+        effect.parameter[0] = 0.1 * tenths;
+        for (size_t i = 0; i < 2 * sizeof chambers_pa / sizeof chambers_pa[0]; i++) {
+            const bool filling = i % 2 == 0;
+            const double pressure_pa[3] = {chambers_pa[i / 2], chambers_pa[i / 2], chambers_pa[i / 2]};
+            struct chamber_influence influence = {.conductance_scale = {1.0, 1.0, 1.0}, .supply_pa = 40000.0};
+            struct effect_signals signals = {.pressure_pa = pressure_pa, .influence = &influence};
+            effects_run(&effect, 1, EFFECT_HOOK_GAS, &signals);
+            const double share = influence.conductance_scale[0] + (filling ? 0.0 : influence.vent_scale_change[0]);
+            const double up_pa = gas->ambient_pa_abs + (filling ? 40000.0 : pressure_pa[0]);
+            const double down_pa = gas->ambient_pa_abs + (filling ? pressure_pa[0] : 0.0);
+            const double flow = share * valve_alone(gas, up_pa, down_pa);
+            double low = down_pa, high = up_pa;
+            for (int k = 0; k < 60; k++) { /* the pressure between them */
+                const double at_pa = 0.5 * (low + high);
+                const double passed = filling ? valve_alone(gas, up_pa, at_pa) : valve_alone(gas, at_pa, down_pa);
+                *((passed > flow) == filling ? &low : &high) = at_pa;
+            }
+            const double line = flow / (filling ? low - down_pa : up_pa - low);
+            least = fmin(least, line);
+            most = fmax(most, line);
+            assert_true(share > 0.0 && share < 1.0);
+            if (!filling && pressure_pa[0] == 10000.0) {
+                assert_relative(share, effect.parameter[0], 0.05);
+            }
+        }
+        assert_relative(most, least, 2e-3);
+    }
+}
+
 /* Where what comes in through the valve goes out through the hole. */
 static void a_leak_holds_the_pressure_where_flows_are_equal(void **state) {
     (void)state;
@@ -771,8 +816,12 @@ static double bent_to(struct effect *effect, double from, double to, int steps) 
 static void a_hysteresis_loop_is_as_wide_as_it_says_at_any_rate(void **state) {
     (void)state;
     const double limit = (double)reference.table.module.bend_limit_rad;
-    for (int steps = 2; steps <= 2000; steps *= 10) {
-        struct effect effect = make("hysteresis:width=0.1,memory=0.3");
+    static const char *const kinds[] = {"hysteresis:width=0.1,memory=0.3", "hysteresis:width=0.05,memory=0.15",
+                                        "hysteresis:width=0.05,memory=0.45", "hysteresis:width=0.1,memory=0.3,form=1",
+                                        "hysteresis:width=0.05,memory=0.15,form=1"};
+    for (size_t i = 0; i < 3 * sizeof kinds / sizeof kinds[0]; i++) {
+        const int steps = i % 3 == 0 ? 2 : i % 3 == 1 ? 20 : 2000;
+        struct effect effect = make(kinds[i / 3]);
         (void)bent_to(&effect, 0.0, limit, steps);
         (void)bent_to(&effect, limit, 0.0, steps);
         for (int cycle = 0; cycle < 2; cycle++) {
@@ -780,37 +829,46 @@ static void a_hysteresis_loop_is_as_wide_as_it_says_at_any_rate(void **state) {
             const double top = bent_to(&effect, 0.5 * limit, limit, steps);
             const double down = bent_to(&effect, limit, 0.5 * limit, steps);
             const double bottom = bent_to(&effect, 0.5 * limit, 0.0, steps);
-            assert_relative(down - up, 0.1 * limit, 0.001);
+            assert_relative(down - up, effect.parameter[0] * limit, 0.001);
             assert_close(0.5 * (down + up), 0.5 * limit, 1e-12); /* round the nominal curve */
             assert_close(top + bottom, limit, 1e-12);
         }
     }
 }
 
-/* Loops of any size up to the memory are about as wide for their size, longer ones are not. */
+/* How wide a cycle from zero to a share of the limit opens, as a share of its own length. */
+static double opens_by(struct effect effect, double share) {
+    const double most = share * (double)reference.table.module.bend_limit_rad;
+    (void)bent_to(&effect, 0.0, most, 50);
+    (void)bent_to(&effect, most, 0.0, 50);
+    const double up = bent_to(&effect, 0.0, 0.5 * most, 50);
+    (void)bent_to(&effect, 0.5 * most, most, 50);
+    return (bent_to(&effect, most, 0.5 * most, 50) - up) / most;
+}
+
+/* Loops of any size up to the memory are about as wide for their size; longer ones all open by as much, and of the other
+ * form nearly all are longer ones. */
 static void hysteresis_loops_grow_with_their_size_up_to_the_memory(void **state) {
     (void)state;
-    const double limit = (double)reference.table.module.bend_limit_rad;
-    const struct {
-        double memory;
-        double cycle;
-        double least;
-        double most;
-    } cases[] = {{0.5, 1.0, 0.08, 0.12},
-                 {0.5, 0.5, 0.08, 0.12},
-                 {0.5, 0.25, 0.05, 0.12},
-                 {0.05, 1.0, 0.0, 0.03},
-                 {0.05, 0.5, 0.02, 0.05}};
-    for (size_t i = 0; i < sizeof cases / sizeof cases[0]; i++) {
-        struct effect effect = make("hysteresis:width=0.1");
-        effect.parameter[1] = cases[i].memory;
-        const double most = cases[i].cycle * limit;
-        (void)bent_to(&effect, 0.0, most, 50);
-        (void)bent_to(&effect, most, 0.0, 50);
-        const double up = bent_to(&effect, 0.0, 0.5 * most, 50);
-        (void)bent_to(&effect, 0.5 * most, most, 50);
-        const double open = (bent_to(&effect, most, 0.5 * most, 50) - up) / most;
-        assert_true(open > cases[i].least && open < cases[i].most);
+    const struct effect all_sizes = make("hysteresis:width=0.1,memory=0.5"), small = make("hysteresis:width=0.02,memory=0.05"),
+                        one_size = make("hysteresis:width=0.05,memory=0.12,form=1");
+    for (double share = 1.0; share > 0.2; share *= 0.5) { // NOLINT(cert-flp30-c): powers of two
+        const double open = opens_by(all_sizes, share);
+        assert_true(open > 0.05 && open < 0.13);
+    }
+    assert_relative(opens_by(small, 0.5), 2.0 * opens_by(small, 1.0), 0.01);
+    assert_relative(opens_by(one_size, 0.5), 2.0 * opens_by(one_size, 1.0), 0.01);
+    assert_true(opens_by(one_size, 0.1) < opens_by(one_size, 0.5));
+}
+
+/* However wide a loop is asked for, the bend never goes the wrong way where the load turns round. */
+static void a_hysteresis_that_asks_for_too_much_only_stands_still(void **state) {
+    (void)state;
+    for (size_t form = 0; form < 2; form++) {
+        struct effect effect = make("hysteresis:width=0.2,memory=0.02");
+        effect.form = form;
+        const double top = bent_to(&effect, 0.0, 1.0, 50), back = bent_to(&effect, 1.0, 0.99, 3);
+        assert_true(back < top);
     }
 }
 
@@ -1012,6 +1070,7 @@ int main(void) {
         cmocka_unit_test(effects_are_smooth_in_their_parameters),
         cmocka_unit_test(a_late_valve_gives_the_same_pressure_later),
         cmocka_unit_test(a_dead_band_stops_small_duties_and_its_loss_shortens_all),
+        cmocka_unit_test(a_laminar_line_has_one_resistance_at_all_pressures),
         cmocka_unit_test(flow_and_volume_scale_the_time_of_filling_and_venting),
         cmocka_unit_test(a_leak_holds_the_pressure_where_flows_are_equal),
         cmocka_unit_test(a_coupled_chamber_shows_a_share_of_its_neighbour),
@@ -1027,6 +1086,7 @@ int main(void) {
         cmocka_unit_test(stiffness_follows_temperature_or_drifts),
         cmocka_unit_test(a_hysteresis_loop_is_as_wide_as_it_says_at_any_rate),
         cmocka_unit_test(hysteresis_loops_grow_with_their_size_up_to_the_memory),
+        cmocka_unit_test(a_hysteresis_that_asks_for_too_much_only_stands_still),
         cmocka_unit_test(a_minor_hysteresis_loop_closes_and_is_forgotten),
         cmocka_unit_test(an_asymmetric_chamber_has_a_gain_and_an_azimuth_of_its_own),
         cmocka_unit_test(a_restrained_module_is_a_shorter_arc_between_longer_caps),

@@ -155,6 +155,19 @@ static void fit_from_typical(const struct bench *bench, const struct effect *tru
     assert_true(fit->sound);
 }
 
+/* A bearing that starts at the other side of the half turn gets there by the short way. */
+static void bearing_is_found_across_the_half_turn(void **state) {
+    static struct bench bench;
+    static const char text[] = "gravity:angle=1.2,azimuth=3.0,weight_scale=1";
+    (void)state;
+    bench_open(&bench, &(struct recording){.effect = {text}, .seconds = SECONDS, .seed = 5, .silent = true});
+    struct fit fit = {.model = model_with("gravity:angle=1.2,azimuth=-2.9,weight_scale=1")};
+    assert_true(fit_rebased(&bench.fine, &bench.coarse, &fit, ROUNDS));
+    assert_close(fit.model.effect[0].parameter[1], 3.0, 0.01);
+    assert_close(fit.model.effect[0].parameter[0], 1.2, 0.01);
+    bench_close(&bench);
+}
+
 /* The largest error of a parameter, as a share of its distance from none. */
 static double worst_error(const struct effect *found, const struct effect *truth) {
     double worst = 0.0;
@@ -400,7 +413,8 @@ static void no_kind_leaves_its_bounds(void **state) {
 int main(void) {
     const struct CMUnitTest tests[] = {cmocka_unit_test(coarse_replay_of_the_base_is_the_fine_one),
                                        cmocka_unit_test(coarse_replay_tells_what_an_effect_changes),
-                                       cmocka_unit_test(parameters_are_found_without_noise),
+                                       cmocka_unit_test(bearing_is_found_across_the_half_turn),
+        cmocka_unit_test(parameters_are_found_without_noise),
                                        cmocka_unit_test(parameters_are_found_through_noise),
                                        cmocka_unit_test(duties_count_when_they_act_whatever_is_wrong),
                                        cmocka_unit_test(covariance_is_the_right_size),

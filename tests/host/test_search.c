@@ -29,6 +29,10 @@ static void two_effects_are_both_named(void **state) {
     assert_int_equal(offset->chamber, 3);
     assert_holds(&offset->parameter[0], 1000.0);
     assert_holds(&creep->parameter[0], 0.12);
+    for (size_t i = 0; i < 2; i++) { /* what has one sign is doubted by a factor */
+        const struct diagnosis_interval *interval = &creep->parameter[i];
+        assert_close(interval->high / interval->value, interval->value / interval->low, 1e-9);
+    }
     assert_true(diagnosis->closed.value > 0.97);
     diagnosed_close(&diagnosed);
 }
@@ -54,6 +58,33 @@ static void effect_that_is_left_out_is_not_named(void **state) {
     }
     assert_true(diagnosed.search.trials > 0);
     assert_verdict(diagnosis, GAP_UNKNOWN); /* nothing else goes on yielding */
+    diagnosed_close(&diagnosed);
+}
+
+/* With another entry of the same stage left out, what is found may as well be that one; else it is nearly sure. */
+static void name_beside_one_that_was_not_tried_is_half_sure(void **state) {
+    static const char *const beside = "tip_misalignment", *const elsewhere = "creep";
+    (void)state;
+    for (int k = 0; k < 2; k++) {
+        const struct search_options options = {.without = k == 0 ? &beside : &elsewhere, .without_count = 1};
+        diagnose("tip_latency:delay=0.03", NULL, &options);
+        assert_verdict(diagnosis, GAP_EFFECT);
+        assert_string_equal(diagnosis->effect[0].kind->name, "tip_latency");
+        assert_true(k == 0 ? diagnosis->effect[0].probability <= 0.5
+                           : diagnosis->effect[0].probability > 0.9 && diagnosis->effect[0].probability < 0.98);
+        diagnosed_close(&diagnosed);
+    }
+}
+
+/* Repeats that begin late are counted from there. */
+static void repeats_from_mid_run_have_their_onset_and_share(void **state) {
+    (void)state;
+    diagnose("tip_freeze:fraction=0.3,onset=4", NULL, NULL);
+    assert_verdict(diagnosis, GAP_EFFECT);
+    assert_string_equal(diagnosis->effect[0].kind->name, "tip_freeze");
+    assert_close(diagnosis->effect[0].onset_s, 4.0, 0.3);
+    assert_holds(&diagnosis->effect[0].parameter[0], 0.3);
+    assert_true(diagnosis->effect[0].parameter[0].low > 0.2);
     diagnosed_close(&diagnosed);
 }
 
@@ -191,6 +222,8 @@ static void stop_ends_the_search_soon(void **state) {
 int main(void) {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(two_effects_are_both_named),           cmocka_unit_test(effect_that_is_left_out_is_not_named),
+        cmocka_unit_test(name_beside_one_that_was_not_tried_is_half_sure),
+        cmocka_unit_test(repeats_from_mid_run_have_their_onset_and_share),
         cmocka_unit_test(effect_from_mid_run_has_its_onset),
         cmocka_unit_test(effect_that_sets_in_late_is_not_taken_for_another),
         cmocka_unit_test(size_at_its_bound_is_not_believed),

@@ -37,6 +37,7 @@ static const struct effect_kind contact = {
     .parameter = {[DIRECTION] = {"direction", "rad", -M_PI, M_PI, 0.0, NAN},
                   [BEND] = {"bend", "rad", 0.05, 2.5, 0.6, NAN},
                   [STIFFNESS] = {"stiffness", "1", 0.0, 20.0, 2.0, 0.0}},
+    .doubt = {[BEND] = 0.1, [STIFFNESS] = 0.4}, /* a wall that yields as round bodies do (Hertz 1882) */
     .shape = touch};
 
 EFFECT_REGISTER(contact);

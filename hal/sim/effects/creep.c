@@ -55,6 +55,7 @@ static const struct effect_kind creep = {
     .parameter_count = 2,
     .parameter = {[AMPLITUDE] = {"amplitude", "1", 0.0, 0.5, 0.1, 0.0},
                   [TIME_CONSTANT] = {"time_constant", "s", 0.05, 600.0, 3.0, NAN}},
+    .doubt = {[AMPLITUDE] = 0.3, [TIME_CONSTANT] = 0.7}, /* stretched exponentials, powers of time (Findley 1976) */
     .load = load,
     .shape = bend};
 

@@ -21,6 +21,7 @@ static const struct effect_kind end_restraint = {
     .scope = EFFECT_GLOBAL,
     .parameter_count = 1,
     .parameter = {[FRACTION] = {"fraction", "1", 0.7, 1.15, 0.93, 1.0}},
+    .doubt = {[FRACTION] = 0.05}, /* how gradually the bend ends */
     .shape = restrain};
 
 EFFECT_REGISTER(end_restraint);

@@ -1,23 +1,40 @@
 /* Bend depends on where it comes from, not on how fast: a sum of play operators on the bend vector (Prandtl
  * 1928, Ishlinskii 1944; vector play as in Krejci 1996). Loops are closed and centred on the nominal curve.
  *
- * The plays' radii are spread evenly on a logarithmic scale below `memory` times the bend limit, all with the
- * same weight. A cycle then opens a loop that is about `width` of its own size, as rubber's are, or once it
- * is much longer than the memory, one of constant size. */
+ * All plays have the same weight; `memory` times the bend limit is the greatest radius. Form 0: radii in a geometric
+ * series, so that loops of all sizes up to the memory are about as wide for their size, as rubber's are. Form 1: radii spread
+ * evenly, so that the bend lags by nearly the same once it has moved by the memory: short cycles hardly open. `width` is the
+ * opening of a cycle from zero to the bend limit at half height, over that limit. */
 #include <math.h>
 
 #include "sim/effect.h"
 
 enum { WIDTH, MEMORY };
+enum { ALL_SIZES, ONE_SIZE };
 
 #define PLAYS 5
-#define RADII_RATIO 1.7
-/* Opening at half height over the length of a cycle from 0 to the bend limit, for plays of weight one and a
- * memory of 0.3: a play of radius r opens 2 r, or what is left of the cycle. */
-#define OPENING 1.154
-/* At OPENING / PLAYS the bend would stand still wherever the load turns round, and beyond it go on the wrong
- * way. */
 #define WIDTH_MOST 0.2
+/* At 1 / PLAYS the bend would stand still wherever the load turns round, and beyond it go on the wrong way: no weight comes
+ * near, however wide a loop is asked for. */
+#define WEIGHT_MOST 0.195
+
+/* Radii over the memory. */
+#define SMALLER 1.7
+static const double shares[2][PLAYS] = {
+    [ALL_SIZES] = {1.0, 1.0 / SMALLER, 1.0 / (SMALLER * SMALLER), 1.0 / (SMALLER * SMALLER * SMALLER),
+                   1.0 / (SMALLER * SMALLER * SMALLER * SMALLER)},
+    [ONE_SIZE] = {0.2, 0.4, 0.6, 0.8, 1.0}};
+
+/* A play of radius r, weight one, opens a cycle of length one by 2 r, or by what is left of the cycle. */
+static double weight_of(size_t form, const double *parameter) {
+    double opening = 0.0;
+    for (size_t i = 0; i < PLAYS; i++) {
+        const double radius = shares[form][i] * parameter[MEMORY];
+        opening += fmax(fmin(2.0 * radius, 1.0 - 2.0 * radius), 0.0);
+    }
+    const double weight = parameter[WIDTH] / opening, square = weight * weight / (WEIGHT_MOST * WEIGHT_MOST);
+    return weight / sqrt(sqrt(sqrt(1.0 + square * square * square * square))); /* straight, with a sharp bend there */
+}
 
 /* The follower stays within the radius of what it follows. */
 static void follow(double follower[2], const double target[2], double radius) {
@@ -30,11 +47,10 @@ static void follow(double follower[2], const double target[2], double radius) {
 
 static void lag(double *state, const double *parameter, struct effect_signals *signals) {
     const double bend[2] = {signals->shape->bend_x_rad, signals->shape->bend_y_rad};
-    const double weight = parameter[WIDTH] / OPENING;
-    double radius = parameter[MEMORY] * (double)signals->table->module.bend_limit_rad;
-    for (size_t i = 0; i < PLAYS; i++, radius /= RADII_RATIO) {
+    const double weight = weight_of(signals->form, parameter), limit_rad = (double)signals->table->module.bend_limit_rad;
+    for (size_t i = 0; i < PLAYS; i++) {
         double *follower = &state[2 * i];
-        follow(follower, bend, radius);
+        follow(follower, bend, shares[signals->form][i] * parameter[MEMORY] * limit_rad);
         signals->shape->bend_x_rad -= weight * (bend[0] - follower[0]);
         signals->shape->bend_y_rad -= weight * (bend[1] - follower[1]);
     }
@@ -48,9 +64,12 @@ static const struct effect_kind hysteresis = {
                  "lags make loops as well, but of a width that depends on the rate",
     .stage = EFFECT_STAGE_BODY,
     .scope = EFFECT_GLOBAL,
+    .forms = 2,
+    .form_what = {"loops of all sizes, as wide for their size", "loops of one size: the bend lags by as much in any long cycle"},
     .parameter_count = 2,
     .parameter = {[WIDTH] = {"width", "1", 0.0, WIDTH_MOST, 0.06, 0.0},
                   [MEMORY] = {"memory", "1", 0.02, 2.0, 0.3, NAN}},
+    .doubt = {[WIDTH] = 0.3, [MEMORY] = 0.5}, /* loops of other shapes: Bouc (1967), Wen (1976) */
     .shape = lag};
 
 EFFECT_REGISTER(hysteresis);

@@ -44,6 +44,7 @@ static const struct effect_kind mullins = {
     .parameter_count = 2,
     .parameter = {[SOFTENING] = {"softening", "1", 0.0, 0.5, 0.15, 0.0},
                   [SCALE] = {"scale", "1", 0.05, 2.0, 0.5, NAN}},
+    .doubt = {[SOFTENING] = 0.25, [SCALE] = 0.5}, /* laws agree on what was seen, not on where it ends */
     .load = soften};
 
 EFFECT_REGISTER(mullins);

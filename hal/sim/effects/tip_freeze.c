@@ -9,6 +9,7 @@ enum { STARTED, LAST };
 static void repeat(double *state, const double *parameter, struct effect_signals *signals) {
     if (state[STARTED] != 0.0 && signals->chance < parameter[FRACTION]) {
         memcpy(signals->pose, &state[LAST], sizeof *signals->pose);
+        signals->repeats = true;
     }
     memcpy(&state[LAST], signals->pose, sizeof *signals->pose);
     state[STARTED] = 1.0;

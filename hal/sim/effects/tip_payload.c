@@ -41,6 +41,7 @@ static const struct effect_kind tip_payload = {
     .parameter = {[MASS] = {"mass", "kg", 0.0, 0.1, 0.01, 0.0},
                   [ANGLE] = {"angle", "rad", 0.0, M_PI, 0.0, NAN},
                   [AZIMUTH] = {"azimuth", "rad", -M_PI, M_PI, 0.0, NAN}},
+    .doubt = {[MASS] = 0.05}, /* where it hangs at the tip */
     .shape = bend,
     .pose = sag};
 

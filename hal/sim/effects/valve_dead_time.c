@@ -20,6 +20,7 @@ static const struct effect_kind valve_dead_time = {
     .scope = EFFECT_EVERY_CHAMBER,
     .parameter_count = 1,
     .parameter = {[DELAY] = {"delay", "s", 0.0, 0.06, 0.01, 0.0}},
+    .doubt = {[DELAY] = 0.02},
     .command = command};
 
 EFFECT_REGISTER(valve_dead_time);
