@@ -6,8 +6,8 @@
 #define NINETY_PERCENT 1.645
 /* What forms that only nearly fit do to a parameter, as a share of the effect's size: this much, and in
  * proportion to what is left of the gap, as an amplitude. Seen against effects of other forms. */
-#define FORM_SHARE 0.01
-#define FORM_BY_REST 1.3
+#define FORM_SHARE 0.006
+#define FORM_BY_REST 0.8
 #define FACTOR_MOST 3.0 /* of an interval, as a logarithm */
 #define BY_CHANCE_SURE 0.95 /* repeats are seen as such */
 #define GROUP_LEAST 0.15    /* belief that puts a name into the group */
@@ -48,7 +48,7 @@ static void name_group(struct diagnosis *diagnosis, const struct rivals *rivals)
 static double inflation(const struct search *search) {
     const struct fit *fit = &search->best;
     const double mean2 = fit_mean_square(&fit->sums, 1);
-    return fmax(mean2, 0.3) * 3.0;
+    return fmax(mean2, 0.3) * 1.5;
 }
 
 /* `form`: what the form of the effect may be off by, one standard deviation. */
