@@ -91,7 +91,7 @@ static struct diagnosis_interval interval_of_parameter(const struct diagnosis *d
         return (struct diagnosis_interval){isnan(parameter->none) ? value : parameter->none, parameter->least,
                                            parameter->most};
     }
-    const bool turns = strcmp(parameter->unit, "rad") == 0 && parameter->least < 0.0 && isnan(parameter->none);
+    const bool turns = gap_parameter_turns(parameter);
     const double none = isnan(parameter->none) ? 0.0 : parameter->none;
     const double size = turns ? 1.0 : value - none; /* a bearing has no size: the radian */
     const double spread = spread_of(search, index, form_share(diagnosis, effect->kind->doubt[i]) * size);

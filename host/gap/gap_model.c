@@ -17,6 +17,10 @@ static double scale_of(const struct effect_parameter *parameter) {
     return parameter->typical != 0.0 ? 0.5 * fabs(parameter->typical) : 0.25 * (parameter->most - parameter->least);
 }
 
+bool gap_parameter_turns(const struct effect_parameter *parameter) {
+    return strcmp(parameter->unit, "rad") == 0 && parameter->most - parameter->least > FULL_TURN_RAD - 1e-9;
+}
+
 size_t gap_model_parameters(struct gap_model *model, struct gap_parameter parameter[GAP_PARAMETERS_MAX]) {
     size_t count = 0;
     parameter[count++] = (struct gap_parameter){
@@ -27,9 +31,9 @@ size_t gap_model_parameters(struct gap_model *model, struct gap_parameter parame
         struct effect *effect = &model->effect[e];
         for (size_t i = effect->kind->by_chance ? 1 : 0; i < effect->kind->parameter_count; i++) {
             const struct effect_parameter *kind = &effect->kind->parameter[i];
-            const bool turns = strcmp(kind->unit, "rad") == 0 && kind->most - kind->least > FULL_TURN_RAD - 1e-9;
-            parameter[count++] = (struct gap_parameter){
-                kind->name, kind->unit, kind->least, kind->most, scale_of(kind), &effect->parameter[i], (int)e, turns};
+            parameter[count++] =
+                (struct gap_parameter){kind->name,      kind->unit, kind->least, kind->most, scale_of(kind), &effect->parameter[i],
+                                       (int)e,          gap_parameter_turns(kind)};
         }
     }
     return count;

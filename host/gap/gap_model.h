@@ -28,6 +28,8 @@ struct gap_parameter {
 
 /* Fills `parameter`; returns how many. Parameters that data cannot move (probabilities) are left out. */
 size_t gap_model_parameters(struct gap_model *model, struct gap_parameter parameter[GAP_PARAMETERS_MAX]);
+/* Is it a full turn's angle? */
+bool gap_parameter_turns(const struct effect_parameter *parameter);
 /* The caller sees to it that there is room for one more. */
 void gap_model_add(struct gap_model *model, const struct effect *effect);
 /* Does the model have that form of the kind in that chamber? An effect on all of them (0) is in each. */
