@@ -32,18 +32,6 @@
 #define IDENTITY_HEAD (1u << NAME_PIECES)
 #define IDENTITY_HASH (2u << NAME_PIECES)
 #define ALL_OF_IDENTITY (ALL_PIECES | IDENTITY_HEAD | IDENTITY_HASH)
-#define SEQUENCE_FLIPS 2u
-#define SEQUENCE_HALF 128u
-#define REFUSED_STEPS 150 /* a refusal within so many control steps of the last TIME is a new one */
-/* Ahead of another host's sequence by so much it is refused from then on, and we are not. Half a turn ahead
- * would look like behind: before that the lead is taken anew, in leaps that the board still takes for steps
- * forward. */
-#define SEQUENCE_OVER 64u
-#define LEAD_LEAST 16u
-#define LEAD_MOST 96u
-#define LEAP 80u
-#define LEAPS 2u
-#define OTHER_HOST_US 1000000
 #define PROTOCOL_MASK 15u
 
 static int64_t now_us(void) {
@@ -83,7 +71,7 @@ static bool send_message(struct can_link *link, enum message_id id, const union 
     message_frame(id, link->node, message, &frame, &trouble);
     link->counters.saturated += trouble.out_of_range;
     if (id != MESSAGE_TRANSFER_DATA) {
-        frame.data[0] = ++link->sequence;
+        frame.data[0] = command_sequence_next(&link->sequence);
         frame.data[1] = (uint8_t)((frame.data[1] & ~PROTOCOL_MASK) | MESSAGE_PROTOCOL);
     }
     return send_frame(link, &frame);
@@ -127,6 +115,9 @@ static bool is_said_again(const struct can_link *link, int64_t time_us) {
     const enum supervisor_state state = link->assembly.report.status.state;
     const bool runs = state == SUPERVISOR_ACTIVE || state == SUPERVISOR_HOLD;
     const enum controller_command_kind kind = link->command.kind;
+    if (kind == COMMAND_HOLD && state == SUPERVISOR_ACTIVE) {
+        return true; /* another host's command came between; a hold starts nothing */
+    }
     if (kind == COMMAND_NONE || kind == COMMAND_CLEAR || time_us >= link->commanded_us + link->start_us) {
         return false;
     }
@@ -211,15 +202,10 @@ static void forget_identity(struct can_link *link) {
     link->identify_us = 0;
 }
 
-/* To the board our sequence looks like an old one of the host before us: half a turn on, it is ahead. Not
- * again and again, for two hosts at once would then take turns. */
+/* The board may take our first command for an old one of the host before us. */
 static void take_refusal(struct can_link *link, const struct message_refusals *refusal) {
-    const int16_t ahead = (int16_t)(uint16_t)(refusal->step - link->assembly.step);
-    if (refusal->count > 0 && refusal->reason == NODE_REFUSED_STALE && ahead > -REFUSED_STEPS &&
-        ahead < REFUSED_STEPS && link->commanded_us > 0 && link->sequence_flips < SEQUENCE_FLIPS &&
-        now_us() - link->other_host_us > OTHER_HOST_US) { /* else the stale one is that host */
-        link->sequence_flips++;
-        link->sequence = (uint8_t)(link->sequence + SEQUENCE_HALF);
+    if (refusal->count > 0 && refusal->reason == NODE_REFUSED_STALE && link->commanded_us > 0 &&
+        command_sequence_refused(&link->sequence, refusal->step, (uint16_t)link->assembly.step, now_us())) {
         link->repeat_us = 0;
     }
 }
@@ -252,29 +238,16 @@ static void take_message(struct can_link *link, enum message_id id, const union 
     }
 }
 
-static void leap(struct can_link *link, uint8_t theirs) {
-    const union message nothing = {0};
-    for (uint32_t l = 0; l < LEAPS; l++) {
-        link->sequence = (uint8_t)(link->sequence + LEAP);
-        (void)send_message(link, MESSAGE_HOST_HEARTBEAT, &nothing);
-    }
-    link->sequence = (uint8_t)(theirs + SEQUENCE_OVER);
-}
-
-/* Another host's command to our board: our next sequence stays over it. What we said before is never gone
- * behind, or the board would take us for the stale one. */
+/* Another host's command to our board: from now on it is the stale one. */
 static void take_other_host(struct can_link *link, enum message_id id, const struct hal_can_frame *frame) {
-    const uint8_t theirs = frame->data[0];
-    const uint8_t lead = (uint8_t)(link->sequence - theirs);
+    const union message nothing = {0};
     link->counters.other_hosts++;
     if (message_row(id)->number >= message_row(MESSAGE_STATUS)->number) {
         return;
     }
-    link->other_host_us = now_us();
-    if (lead > LEAD_MOST && lead < SEQUENCE_HALF && is_kept_alive(&link->command)) {
-        leap(link, theirs);
-    } else if (lead < LEAD_LEAST || lead >= SEQUENCE_HALF) {
-        link->sequence = (uint8_t)(theirs + SEQUENCE_OVER);
+    command_sequence_pass(&link->sequence, frame->data[0], is_kept_alive(&link->command), now_us());
+    while (link->sequence.leaps > 0) {
+        (void)send_message(link, MESSAGE_HOST_HEARTBEAT, &nothing);
     }
 }
 
@@ -435,7 +408,7 @@ bool can_link_open(struct can_link *link, const char *bus, uint32_t node, char *
     link->wake = link->timer = -1;
     link->heartbeat_period_us = HEARTBEAT_US;
     link->start_us = START_US;
-    link->sequence = (uint8_t)now_us();
+    command_sequence_start(&link->sequence, (uint8_t)now_us());
     can_assembly_init(&link->assembly);
     if (snprintf(link->bus, sizeof link->bus, "%s", bus) >= (int)sizeof link->bus) {
         (void)snprintf(error, error_bytes, "bus %s: its name is too long", bus);

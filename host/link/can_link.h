@@ -14,6 +14,7 @@
 #include <pthread.h>
 
 #include "link/can_assembly.h"
+#include "link/command_sequence.h"
 #include "link/transport.h"
 
 #define CAN_LINK_NODE_DEFAULT 1u
@@ -98,9 +99,7 @@ struct can_link {
     int64_t heartbeat_us; /* when the next one is due */
     int64_t heartbeat_period_us;
     int64_t identify_us; /* when the board is asked next who it is */
-    int64_t other_host_us; /* when another host last commanded our board; 0: none did */
-    uint8_t sequence;
-    uint32_t sequence_flips;
+    struct command_sequence sequence;
     /* the thread's */
     struct transport transport;
     int wake; /* eventfd */
