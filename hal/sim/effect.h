@@ -78,6 +78,7 @@ struct effect_kind {
     size_t forms;          /* the same cause may act in different ways: how many, 0 or 1 where there is one */
     const char *form_what[EFFECT_FORMS_MAX];
     bool forms_add;        /* a real case has all forms at once, each with parameters of its own */
+    bool delays;    /* what it does is to be late: in one loop it looks like whatever else is */
     bool by_chance; /* parameter 0 is the probability that it acts at a tip sample (signals->chance below it) */
     bool by_threshold; /* nothing happens on one side of parameter 0: a fit must start on the right one */
     bool by_sample; /* what it does depends on when the sensor samples: a replay may not leave samples out */

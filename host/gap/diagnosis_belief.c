@@ -13,7 +13,7 @@
 #define GROUP_LEAST 0.15    /* belief that puts a name into the group */
 #define SLUGGISH_SHARE 0.7
 /* How often names that had no rival left were right, on data of another plant's causes; and, where an entry of the same
- * stage was left out, as likely as one that nobody tried. */
+ * stage, or another delay, was left out, as likely as one that nobody tried. */
 #define LISTED_SHARE 0.97
 #define UNTRIED_SHARE 0.5
 
@@ -251,7 +251,8 @@ static bool was_left_out(const struct search *search, const struct effect_kind *
     bool left_out = false;
     for (size_t k = 0; k < effect_kind_count(); k++) {
         const struct effect_kind *other = effect_kind_at(k);
-        left_out = left_out || (other->stage == kind->stage && search_leaves_out(search, other->name));
+        const bool near = other->stage == kind->stage || (other->delays && kind->delays);
+        left_out = left_out || (near && search_leaves_out(search, other->name));
     }
     return left_out;
 }

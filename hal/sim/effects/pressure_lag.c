@@ -32,6 +32,7 @@ static const struct effect_kind pressure_lag = {
                  "right. Unlike line_volume it leaves the module alone",
     .stage = EFFECT_STAGE_PRESSURE_SENSOR,
     .scope = EFFECT_EVERY_CHAMBER,
+    .delays = true,
     .parameter_count = 1,
     .parameter = {[TIME_CONSTANT] = {"time_constant", "s", 0.0, 0.3, 0.03, 0.0}},
     .reading = read};

@@ -109,6 +109,7 @@ static const struct effect_kind tip_latency = {
     .stage = EFFECT_STAGE_TIP_SENSOR,
     .scope = EFFECT_GLOBAL,
     .by_sample = true,
+    .delays = true,
     .parameter_count = 1,
     .parameter = {[DELAY] = {"delay", "s", 0.0, DELAY_MOST_S, 0.03, 0.0}},
     .pose = delay};

@@ -18,6 +18,7 @@ static const struct effect_kind valve_dead_time = {
                  "the size of the step; on slow ramps the same as pressure_lag",
     .stage = EFFECT_STAGE_VALVE,
     .scope = EFFECT_EVERY_CHAMBER,
+    .delays = true,
     .parameter_count = 1,
     .parameter = {[DELAY] = {"delay", "s", 0.0, 0.06, 0.01, 0.0}},
     .doubt = {[DELAY] = 0.02},
