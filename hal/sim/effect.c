@@ -133,11 +133,36 @@ static void run_one(struct effect *effect, effect_hook hook, struct effect_signa
     }
 }
 
+/* What it does is not seen, but what it makes of that for later. */
+static void run_unseen(struct effect *effect, effect_hook hook, const struct effect_signals *signals) {
+    struct per_chamber chambers = {0};
+    struct body_shape shape = {0};
+    struct tip_pose pose = {0};
+    struct effect_signals unseen = *signals;
+    keep(&chambers, signals);
+    unseen.duty = signals->duty != NULL ? chambers.duty : NULL;
+    unseen.late_s = signals->late_s != NULL ? chambers.late_s : NULL;
+    unseen.reading_pa = signals->reading_pa != NULL ? chambers.reading_pa : NULL;
+    unseen.load_pa = signals->load_pa != NULL ? chambers.load_pa : NULL;
+    unseen.influence = signals->influence != NULL ? &chambers.influence : NULL;
+    if (signals->shape != NULL) {
+        shape = *signals->shape;
+        unseen.shape = &shape;
+    }
+    if (signals->pose != NULL) {
+        pose = *signals->pose;
+        unseen.pose = &pose;
+    }
+    run_one(effect, hook, &unseen);
+}
+
 void effects_run(struct effect *effect, size_t count, enum effect_hook_kind hook, struct effect_signals *signals) {
     for (size_t i = 0; i < count; i++) {
         const effect_hook call = hook_of(effect[i].kind, hook);
         if (call != NULL && signals->time_s >= effect[i].onset_s) {
             run_one(&effect[i], call, signals);
+        } else if (call != NULL && effect[i].latent) {
+            run_unseen(&effect[i], call, signals);
         }
     }
 }
@@ -188,6 +213,12 @@ static bool set_parameter(struct effect *effect, const char *name, const char *t
     }
     if (strcmp(name, "onset") == 0) {
         return read_value(text, kind->name, name, 0.0, 1e6, "s", &effect->onset_s, error, bytes);
+    }
+    if (strcmp(name, "latent") == 0 && kind->remembers) {
+        double latent;
+        const bool known = read_value(text, kind->name, name, 0.0, 1.0, "1", &latent, error, bytes);
+        effect->latent = known && latent >= 0.5;
+        return known;
     }
     if (strcmp(name, "form") == 0 && kind->forms > 1) {
         double form;

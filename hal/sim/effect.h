@@ -78,6 +78,7 @@ struct effect_kind {
     size_t forms;          /* the same cause may act in different ways: how many, 0 or 1 where there is one */
     const char *form_what[EFFECT_FORMS_MAX];
     bool forms_add;        /* a real case has all forms at once, each with parameters of its own */
+    bool remembers;        /* what it does depends on what was long ago: it may have seen that before its onset */
     bool delays;    /* what it does is to be late: in one loop it looks like whatever else is */
     bool by_chance; /* parameter 0 is the probability that it acts at a tip sample (signals->chance below it) */
     bool by_threshold; /* nothing happens on one side of parameter 0: a fit must start on the right one */
@@ -100,6 +101,7 @@ struct effect {
     size_t chamber; /* 1 to 3: on that one only; 0: on all */
     size_t form;    /* 0 to kind->forms - 1 */
     double onset_s; /* nothing happens before */
+    bool latent;    /* yet its state runs from the start, unseen: it remembers what was before its onset */
     double parameter[EFFECT_PARAMETERS_MAX];
     double state[EFFECT_STATE_DOUBLES];
 };
@@ -119,7 +121,8 @@ const struct effect_kind *effect_kind_at(size_t index); /* sorted by name */
 const struct effect_kind *effect_kind_find(const char *name);
 const char *effect_stage_name(enum effect_stage stage);
 void effect_init(struct effect *effect, const struct effect_kind *kind);
-/* "NAME" or "NAME:parameter=value,parameter=value" in SI units; chamber=N, form=N and onset=SECONDS as well. False: `error` says
+/* "NAME" or "NAME:parameter=value,parameter=value" in SI units; chamber=N, form=N, onset=SECONDS and, of a kind that
+ * remembers, latent=0 or 1 as well. False: `error` says
  * what is wrong. */
 bool effect_parse(const char *text, struct effect *effect, char *error, size_t error_bytes);
 /* Of its law: the least doubt, over the parameters that have one; 0: none has. */

@@ -19,7 +19,8 @@ static bool acts_on_gas(const struct effect_kind *kind) {
 }
 
 static bool same_effect(const struct effect *a, const struct effect *b) {
-    bool same = a->kind == b->kind && a->chamber == b->chamber && a->form == b->form && a->onset_s == b->onset_s;
+    bool same = a->kind == b->kind && a->chamber == b->chamber && a->form == b->form && a->onset_s == b->onset_s &&
+                a->latent == b->latent;
     for (size_t i = 0; same && i < a->kind->parameter_count; i++) {
         same = a->parameter[i] == b->parameter[i];
     }

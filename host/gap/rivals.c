@@ -109,7 +109,7 @@ static size_t gather(const struct search *search, const struct gap_model *rest,
 }
 
 /* The rest with the entry's own effects, from the onset of the one that they stand in for. */
-static bool put_in_place(const struct gap_model *rest, const struct entry *entry, double onset_s,
+static bool put_in_place(const struct gap_model *rest, const struct entry *entry, const struct effect *held,
                          struct gap_model *model) {
     *model = *rest;
     if (entry->alone) {
@@ -125,7 +125,9 @@ static bool put_in_place(const struct gap_model *rest, const struct entry *entry
             return false;
         }
         model->effect[model->count] = *effect;
-        model->effect[model->count++].onset_s = fmax(effect->onset_s, onset_s);
+        struct effect *put = &model->effect[model->count++];
+        put->onset_s = fmax(effect->onset_s, held->onset_s);
+        put->latent = put->onset_s > 0.0 && put->kind->remembers && (effect->latent || held->latent);
     }
     return true;
 }
@@ -212,7 +214,7 @@ static void find_in_place(struct search *search, struct rivals *rivals, struct e
     for (size_t i = 0; i < found && rivals->count < RIVALS_MAX; i++) {
         struct rival *rival = &rivals->rival[rivals->count];
         *rival = (struct rival){.kind = list[i].own->kind};
-        rivals->count += put_in_place(&rest, &list[i], held->onset_s, &rival->fit.model);
+        rivals->count += put_in_place(&rest, &list[i], held, &rival->fit.model);
     }
     struct fit *without = &rivals->rest;
     *without = (struct fit){.model = rest};

@@ -180,11 +180,15 @@ bool search_run(struct search *search, const struct gap_data *data, const struct
         if (step > 0 && !search_has_rest(search, &search->best)) {
             break;
         }
-        if (!search_add_one(search, room, step)) {
+        const bool found = search_add_one(search, room, step);
+        if (!found && step > 0) {
             break;
         }
-        sound = search_recalibrate(search, &search->best, true) &&
-                (step > 0 || search_after_onset(search, room)) && take_repeats(search, step);
+        sound = search_recalibrate(search, &search->best, true) && (step > 0 || search_after_onset(search, room));
+        if (search->best.model.count == 0) {
+            break; /* not even of the last part */
+        }
+        sound = sound && take_repeats(search, step);
     }
     if (sound && !search_stopped(search) && search->best.model.count == 0 && search_all_have_duties(data)) {
         sound = look_closer(search, room);

@@ -61,6 +61,7 @@ static void try_other_forms(struct search_crew *crew, size_t e, struct fit *fit)
         other->form = form;
         other->chamber = own->chamber;
         other->onset_s = own->onset_s;
+        other->latent = own->latent;
         if (form != own->form) {
             fitter_run(&crew->fitter[0], &trial, REFINE_ROUNDS, true);
             *fit = all_squares(&trial) < all_squares(fit) ? trial : *fit;
@@ -68,24 +69,43 @@ static void try_other_forms(struct search_crew *crew, size_t e, struct fit *fit)
     }
 }
 
+/* Closer and closer around where it is. */
+static void refine_onset(struct search_crew *crew, double width_s, size_t e, struct fit *fit) {
+    struct fit trial[ONSETS];
+    while (width_s > ONSET_FINE_S) {
+        const struct fit centre = *fit;
+        const double first_s = centre.model.effect[e].onset_s - width_s;
+        const struct fit *best =
+            try_onsets(crew, &centre, e, first_s, 2.0 * width_s / (ONSETS - 1.0), ONSET_FINE_ROUNDS, trial);
+        *fit = all_squares(best) < all_squares(fit) ? *best : *fit;
+        width_s *= 0.4;
+    }
+}
+
+/* What remembers may do so from before its onset, and then sets in at another time. */
+static void try_latent(struct search_crew *crew, double width_s, size_t e, struct fit *fit) {
+    struct fit latent = *fit;
+    if (!latent.model.effect[e].kind->remembers) {
+        return;
+    }
+    latent.model.effect[e].latent = true;
+    fitter_run(&crew->fitter[0], &latent, ONSET_ROUNDS, true);
+    refine_onset(crew, width_s, e, &latent);
+    *fit = all_squares(&latent) < all_squares(fit) ? latent : *fit;
+}
+
 /* When did each effect set in? Tried on a grid, then closer and closer; kept where it explains more. */
 static void find_onset(struct search_crew *crew, double end_s, size_t e, struct fit *fit) {
     struct fit trial[ONSETS];
     const struct fit before = *fit;
-    double width_s = end_s / (ONSETS + 1.0);
+    const double width_s = end_s / (ONSETS + 1.0);
     const struct fit *best = try_onsets(crew, &before, e, width_s, width_s, ONSET_ROUNDS, trial);
     if (!search_is_better(&before, best)) {
         return;
     }
     *fit = *best;
-    while (width_s > ONSET_FINE_S) {
-        const struct fit centre = *fit;
-        const double first_s = centre.model.effect[e].onset_s - width_s;
-        best =
-            try_onsets(crew, &centre, e, first_s, 2.0 * width_s / (ONSETS - 1.0), ONSET_FINE_ROUNDS, trial);
-        *fit = all_squares(best) < all_squares(fit) ? *best : *fit;
-        width_s *= 0.4;
-    }
+    refine_onset(crew, width_s, e, fit);
+    try_latent(crew, width_s, e, fit);
     /* a real onset leaves little; a form that is somewhat off gains a little by any */
     if (before.model.effect[e].onset_s == 0.0 &&
         search_structure(fit) > ONSET_LEAVES * search_structure(&before)) {

@@ -52,6 +52,7 @@ static const struct effect_kind creep = {
     .forms = 3,
     .form_what = {"the bend, with one time constant", "the bend, with a broad spectrum of time constants",
                   "the stiffness, with one time constant"},
+    .remembers = true,
     .parameter_count = 2,
     .parameter = {[AMPLITUDE] = {"amplitude", "1", 0.0, 0.5, 0.1, 0.0},
                   [TIME_CONSTANT] = {"time_constant", "s", 0.05, 600.0, 3.0, NAN}},

@@ -15,7 +15,7 @@ enum { ALL_SIZES, ONE_SIZE };
 #define PLAYS 5
 #define WIDTH_MOST 0.2
 /* At 1 / PLAYS the bend would stand still wherever the load turns round, and beyond it go on the wrong way: no weight comes
- * near, however wide a loop is asked for. */
+ * near. A loop so wide has a memory that is long enough for it, whatever shorter one is asked for. */
 #define WEIGHT_MOST 0.195
 
 /* Radii over the memory. */
@@ -25,15 +25,26 @@ static const double shares[2][PLAYS] = {
                    1.0 / (SMALLER * SMALLER * SMALLER * SMALLER)},
     [ONE_SIZE] = {0.2, 0.4, 0.6, 0.8, 1.0}};
 
+/* Over the bend limit: what is asked for, or with a smooth bend the least that opens as far under the greatest weight. Plays of
+ * small radii open a cycle by twice their sum. */
+static double memory_of(size_t form, const double *parameter) {
+    double sum = 0.0;
+    for (size_t i = 0; i < PLAYS; i++) {
+        sum += shares[form][i];
+    }
+    const double least = parameter[WIDTH] / (2.0 * WEIGHT_MOST * sum), share = least / parameter[MEMORY];
+    const double fourth = share * share * share * share;
+    return parameter[MEMORY] * sqrt(sqrt(sqrt(1.0 + fourth * fourth)));
+}
+
 /* A play of radius r, weight one, opens a cycle of length one by 2 r, or by what is left of the cycle. */
-static double weight_of(size_t form, const double *parameter) {
+static double weight_of(size_t form, double width, double memory) {
     double opening = 0.0;
     for (size_t i = 0; i < PLAYS; i++) {
-        const double radius = shares[form][i] * parameter[MEMORY];
+        const double radius = shares[form][i] * memory;
         opening += fmax(fmin(2.0 * radius, 1.0 - 2.0 * radius), 0.0);
     }
-    const double weight = parameter[WIDTH] / opening, square = weight * weight / (WEIGHT_MOST * WEIGHT_MOST);
-    return weight / sqrt(sqrt(sqrt(1.0 + square * square * square * square))); /* straight, with a sharp bend there */
+    return fmin(width / opening, WEIGHT_MOST);
 }
 
 /* The follower stays within the radius of what it follows. */
@@ -47,10 +58,11 @@ static void follow(double follower[2], const double target[2], double radius) {
 
 static void lag(double *state, const double *parameter, struct effect_signals *signals) {
     const double bend[2] = {signals->shape->bend_x_rad, signals->shape->bend_y_rad};
-    const double weight = weight_of(signals->form, parameter), limit_rad = (double)signals->table->module.bend_limit_rad;
+    const double memory = memory_of(signals->form, parameter), weight = weight_of(signals->form, parameter[WIDTH], memory);
+    const double limit_rad = (double)signals->table->module.bend_limit_rad;
     for (size_t i = 0; i < PLAYS; i++) {
         double *follower = &state[2 * i];
-        follow(follower, bend, shares[signals->form][i] * parameter[MEMORY] * limit_rad);
+        follow(follower, bend, shares[signals->form][i] * memory * limit_rad);
         signals->shape->bend_x_rad -= weight * (bend[0] - follower[0]);
         signals->shape->bend_y_rad -= weight * (bend[1] - follower[1]);
     }
@@ -66,6 +78,7 @@ static const struct effect_kind hysteresis = {
     .scope = EFFECT_GLOBAL,
     .forms = 2,
     .form_what = {"loops of all sizes, as wide for their size", "loops of one size: the bend lags by as much in any long cycle"},
+    .remembers = true,
     .parameter_count = 2,
     .parameter = {[WIDTH] = {"width", "1", 0.0, WIDTH_MOST, 0.06, 0.0},
                   [MEMORY] = {"memory", "1", 0.02, 2.0, 0.3, NAN}},

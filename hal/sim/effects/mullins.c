@@ -41,6 +41,7 @@ static const struct effect_kind mullins = {
     .scope = EFFECT_EVERY_CHAMBER,
     .forms = 2,
     .form_what = {"softer below the greatest past load only", "softer for good, by the greatest past load"},
+    .remembers = true,
     .parameter_count = 2,
     .parameter = {[SOFTENING] = {"softening", "1", 0.0, 0.5, 0.15, 0.0},
                   [SCALE] = {"scale", "1", 0.05, 2.0, 0.5, NAN}},

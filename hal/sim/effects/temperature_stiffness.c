@@ -31,6 +31,7 @@ static const struct effect_kind temperature_stiffness = {
                  "late. In a short recording it is an error of stiffness",
     .stage = EFFECT_STAGE_BODY,
     .scope = EFFECT_GLOBAL,
+    .remembers = true,
     .parameter_count = 2,
     .parameter = {[PER_KELVIN] = {"per_kelvin", "1/K", -0.03, 0.03, 0.004, 0.0},
                   [DRIFT] = {"drift", "1/s", -0.01, 0.01, 5e-4, 0.0}},
