@@ -43,24 +43,47 @@ static bool take_repeats(struct search *search, size_t step) {
     return sound && search_recalibrate(search, &search->best, true);
 }
 
-/* What changes pressures only slightly shows best at the tip, once the pressures are taken to be what the
- * duties make of them: near ninety degrees a few pascals turn it more than its sensor errs. */
-static bool look_closer(struct search *search, struct search_workspace *room) {
-    search->replay.rigid = true;
+/* Anew, with the tip from measured pressures or, `rigid`, from what the duties make of them. */
+static bool begin_anew(struct search *search, struct search_workspace *room, bool rigid) {
+    const struct gap_model plain = {.stiffness_scale = 1.0, .supply_scale = 1.0};
+    search->replay.rigid = rigid;
     search->trials = 0;
     room->singles = 0;
-    const struct gap_model plain = {.stiffness_scale = 1.0, .supply_scale = 1.0};
     search->nominal.model = plain;
-    bool sound = search_recalibrate(search, &search->nominal, false) &&
-                 search_recalibrate(search, &search->recalibrated, true);
+    const bool sound = search_recalibrate(search, &search->nominal, false) &&
+                       search_recalibrate(search, &search->recalibrated, true);
     search->best = search->recalibrated;
+    return sound;
+}
+
+static bool look_again(struct search *search, struct search_workspace *room, bool rigid) {
+    bool sound = begin_anew(search, room, rigid);
     for (size_t step = 0; step < 2 && sound && !search_stopped(search) && search_is_structured(&search->best);
          step++) {
-        if (!search_add_one(search, room, step)) {
+        const bool found = search_add_one(search, room, step);
+        if (!found && step > 0) {
             break;
         }
         sound =
             search_recalibrate(search, &search->best, true) && (step > 0 || search_after_onset(search, room));
+        if (search->best.model.count == 0) {
+            break; /* not even of the last part */
+        }
+    }
+    return sound;
+}
+
+/* What changes pressures only slightly shows best at the tip, once the pressures are taken to be what the
+ * duties make of them: near ninety degrees a few pascals turn it more than its sensor errs. Where they turn it so far that
+ * no fit finds its way, a faint gap of the pressures is looked at by itself after all. */
+static bool look_closer(struct search *search, struct search_workspace *room, bool faint) {
+    bool sound = look_again(search, room, true);
+    if (sound && faint && search->best.model.count == 0 && search_is_structured(&search->best) &&
+        !search_stopped(search)) {
+        sound = look_again(search, room, false);
+        if (sound && search->best.model.count == 0) {
+            sound = begin_anew(search, room, true);
+        }
     }
     return sound;
 }
@@ -191,7 +214,7 @@ bool search_run(struct search *search, const struct gap_data *data, const struct
         sound = sound && take_repeats(search, step);
     }
     if (sound && !search_stopped(search) && search->best.model.count == 0 && search_all_have_duties(data)) {
-        sound = look_closer(search, room);
+        sound = look_closer(search, room, faint);
     }
     if (sound && !search_stopped(search)) {
         drop_idle(search);
