@@ -94,6 +94,7 @@ int cli_effects(int argc, char **argv) {
     for (size_t i = 0; i < effect_kind_count(); i++) {
         print_kind(effect_kind_at(i));
     }
-    printf("every effect also takes onset=SECONDS: nothing happens before\n");
+    printf("every effect also takes onset=SECONDS: nothing happens before; creep, hysteresis, mullins and temperature_stiffness then take\n"
+           "latent=1: what they remember runs from the start, unseen\n");
     return EXIT_OK;
 }

@@ -66,6 +66,18 @@ static bool take_onset(const struct check *check, struct effect *effect) {
                                             effect->onset_s);
 }
 
+static bool take_latent(const struct check *check, struct effect *effect) {
+    const char *name = effect->kind->name;
+    const int latent = check->entry->latent;
+    if (latent > 1 || (latent > 0 && !effect->kind->remembers)) {
+        return effect->kind->remembers
+                   ? reject(check, check->entry->line, "latent", "%s takes 0 or 1, not %d", name, latent)
+                   : reject(check, check->entry->line, "latent", "%s remembers nothing: 0, not %d", name, latent);
+    }
+    effect->latent = latent == 1;
+    return true;
+}
+
 /* NULL: `error` says that it is missing or given twice. */
 static const struct calibration_parameter_entry *find_parameter(const struct check *check, const char *name) {
     const struct calibration_effect_entry *entry = check->entry;
@@ -128,6 +140,7 @@ static bool take_effect(const struct check *check, struct effect *effect) {
     }
     effect_init(effect, kind);
     bool sound = take_form(check, effect) && take_chamber(check, effect) && take_onset(check, effect) &&
+                 take_latent(check, effect) &&
                  known_parameters(check, kind);
     for (size_t i = 0; i < kind->parameter_count && sound; i++) {
         sound = take_parameter(check, effect, i);

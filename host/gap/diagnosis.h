@@ -36,6 +36,7 @@ struct diagnosis_effect {
     size_t place; /* in the search's best model */
     size_t chamber;
     double onset_s;
+    bool latent; /* it remembers what was before its onset */
     double probability;
     struct diagnosis_interval parameter[EFFECT_PARAMETERS_MAX];
 };

@@ -126,7 +126,8 @@ void diagnosis_take_effects(struct diagnosis *diagnosis, const struct search *se
                                          .form = effect->form,
                                          .place = e,
                                          .chamber = effect->chamber,
-                                         .onset_s = effect->onset_s};
+                                         .onset_s = effect->onset_s,
+                                         .latent = effect->latent && effect->onset_s > 0.0};
         for (size_t i = 0; i < effect->kind->parameter_count; i++) {
             const bool counted = effect->kind->by_chance && i == 0;
             out->parameter[i] = counted ? interval_of_share(search, effect->parameter[i])

@@ -185,9 +185,9 @@ static json_t *effect_json(const struct diagnosis_effect *effect) {
         json_object_set_new(parameters, effect->kind->parameter[i].name,
                             interval_json(&effect->parameter[i], effect->kind->parameter[i].unit));
     }
-    return json_pack("{s:s,s:s,s:i,s:i,s:f,s:f,s:o}", "name", effect->kind->name, "stage",
+    return json_pack("{s:s,s:s,s:i,s:i,s:f,s:b,s:f,s:o}", "name", effect->kind->name, "stage",
                      effect_stage_name(effect->kind->stage), "form", (int)effect->form, "chamber", (int)effect->chamber, "onset_s",
-                     effect->onset_s, "probability", effect->probability, "parameters", parameters);
+                     effect->onset_s, "latent", effect->latent, "probability", effect->probability, "parameters", parameters);
 }
 
 static json_t *effects_json(const struct diagnosis *diagnosis) {
@@ -379,8 +379,8 @@ bool gap_report_calibration(const struct diagnosis *diagnosis, const struct gap_
     fprintf(out, "effects:%s\n", named && diagnosis->effects > 0 ? "" : " []");
     for (size_t e = 0; e < diagnosis->effects && named; e++) {
         const struct diagnosis_effect *effect = &diagnosis->effect[e];
-        fprintf(out, "  - name: %s\n    form: %zu\n    chamber: %zu\n    onset_s: %.6g\n    parameters:\n", effect->kind->name,
-                effect->form, effect->chamber, effect->onset_s);
+        fprintf(out, "  - name: %s\n    form: %zu\n    chamber: %zu\n    onset_s: %.6g\n%s    parameters:\n", effect->kind->name,
+                effect->form, effect->chamber, effect->onset_s, effect->latent ? "    latent: 1\n" : "");
         for (size_t i = 0; i < effect->kind->parameter_count; i++) {
             const struct diagnosis_interval *value = &effect->parameter[i];
             fprintf(out, "      - { name: %s, value: %.8g, low: %.8g, high: %.8g, unit: \"%s\" }\n",

@@ -33,6 +33,7 @@ static const cyaml_schema_field_t effect_fields[] = {
     CYAML_FIELD_STRING_PTR("form", OPTIONAL_POINTER, struct calibration_effect_entry, form_text, 0, TEXT_MOST),
     CYAML_FIELD_STRING_PTR("chamber", OPTIONAL_POINTER, struct calibration_effect_entry, chamber_text, 0, TEXT_MOST),
     CYAML_FIELD_STRING_PTR("onset_s", OPTIONAL_POINTER, struct calibration_effect_entry, onset_text, 0, TEXT_MOST),
+    CYAML_FIELD_STRING_PTR("latent", OPTIONAL_POINTER, struct calibration_effect_entry, latent_text, 0, TEXT_MOST),
     CYAML_FIELD_SEQUENCE("parameters", CYAML_FLAG_POINTER, struct calibration_effect_entry, parameters,
                          &parameter_schema, 0, PARAMETERS_MOST),
     CYAML_FIELD_END};
@@ -101,7 +102,8 @@ static bool read_effect(const struct reading *reading, struct calibration_effect
     effect->line = yaml_file_line(reading->path, "name", ++*names);
     bool sound = read_whole(reading, effect->line, "form", effect->form_text, &effect->form) &&
                  read_whole(reading, effect->line, "chamber", effect->chamber_text, &effect->chamber) &&
-                 read_number(reading, effect->line, "onset_s", effect->onset_text, &effect->onset_s);
+                 read_number(reading, effect->line, "onset_s", effect->onset_text, &effect->onset_s) &&
+                 read_whole(reading, effect->line, "latent", effect->latent_text, &effect->latent);
     for (unsigned i = 0; i < effect->parameters_count && sound; i++) {
         struct calibration_parameter_entry *parameter = &effect->parameters[i];
         parameter->line = yaml_file_line(reading->path, "name", ++*names);

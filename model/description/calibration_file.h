@@ -29,12 +29,14 @@ struct calibration_effect_entry {
     char *form_text;
     char *chamber_text;
     char *onset_text;
+    char *latent_text;
     struct calibration_parameter_entry *parameters;
     unsigned parameters_count;
     int line;
     int form;
     int chamber;
     double onset_s;
+    int latent;
 };
 
 struct calibration_file {

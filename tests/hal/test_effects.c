@@ -230,6 +230,33 @@ static void before_its_onset_an_effect_does_nothing(void **state) {
     }
 }
 
+/* What it remembers before, it does not show before; from then on it acts as if it always had. */
+static void before_its_onset_a_latent_effect_only_remembers(void **state) {
+    (void)state;
+    static struct record nominal, late, always;
+    const size_t onset_ms = 3000;
+    size_t kinds = 0;
+    run_plant(NULL, &nominal);
+    for (size_t i = 0; i < effect_kind_count(); i++) {
+        struct effect effect;
+        effect_init(&effect, effect_kind_at(i));
+        if (!effect.kind->remembers) {
+            continue;
+        }
+        kinds++;
+        run_plant(&effect, &always);
+        effect_init(&effect, effect_kind_at(i));
+        effect.onset_s = 1e-3 * (double)onset_ms + 1e-9;
+        effect.latent = true;
+        run_plant(&effect, &late);
+        const size_t before = 7 * onset_ms / 10, all = sizeof late.pose / sizeof(double);
+        assert_memory_equal(&nominal.pose, &late.pose, before * sizeof(double));
+        assert_memory_equal((const double *)&always.pose + before + 7, (const double *)&late.pose + before + 7,
+                            (all - before - 7) * sizeof(double));
+    }
+    assert_int_equal(kinds, 4);
+}
+
 /* All hooks once, the other chambers' signals untouched. */
 static void an_effect_on_one_chamber_stays_there(void **state) {
     (void)state;
@@ -818,7 +845,8 @@ static void a_hysteresis_loop_is_as_wide_as_it_says_at_any_rate(void **state) {
     const double limit = (double)reference.table.module.bend_limit_rad;
     static const char *const kinds[] = {"hysteresis:width=0.1,memory=0.3", "hysteresis:width=0.05,memory=0.15",
                                         "hysteresis:width=0.05,memory=0.45", "hysteresis:width=0.1,memory=0.3,form=1",
-                                        "hysteresis:width=0.05,memory=0.15,form=1"};
+                                        "hysteresis:width=0.05,memory=0.15,form=1", "hysteresis:width=0.2,memory=0.02",
+                                        "hysteresis:width=0.15,memory=0.05,form=1"};
     for (size_t i = 0; i < 3 * sizeof kinds / sizeof kinds[0]; i++) {
         const int steps = i % 3 == 0 ? 2 : i % 3 == 1 ? 20 : 2000;
         struct effect effect = make(kinds[i / 3]);
@@ -1066,6 +1094,7 @@ int main(void) {
         cmocka_unit_test(at_none_nothing_changes),
         cmocka_unit_test(typical_values_show_where_they_should),
         cmocka_unit_test(before_its_onset_an_effect_does_nothing),
+        cmocka_unit_test(before_its_onset_a_latent_effect_only_remembers),
         cmocka_unit_test(an_effect_on_one_chamber_stays_there),
         cmocka_unit_test(effects_are_smooth_in_their_parameters),
         cmocka_unit_test(a_late_valve_gives_the_same_pressure_later),

@@ -73,7 +73,7 @@ static void what_a_diagnosis_writes_is_read_back(void **state) {
                                                     .onset_s = 4.25,
                                                     .parameter = {around(3.21e-11)}};
     diagnosis.effect[1] =
-        (struct diagnosis_effect){.kind = effect_kind_find("creep"), .parameter = {around(0.0765), around(1.25)}};
+        (struct diagnosis_effect){.kind = effect_kind_find("creep"), .onset_s = 3.0, .latent = true, .parameter = {around(0.0765), around(1.25)}};
     (void)snprintf(data.run[0].path, sizeof data.run[0].path, "%s", "runs/first run.csv");
     assert_true(gap_report_calibration(&diagnosis, &data, path, error, sizeof error));
     if (!calibration_read(path, MODULE, &calibration, error, sizeof error)) {
@@ -88,6 +88,7 @@ static void what_a_diagnosis_writes_is_read_back(void **state) {
     assert_relative(calibration.effect[0].onset_s, 4.25, 1e-6);
     assert_relative(calibration.effect[0].parameter[0], 3.21e-11, 1e-7);
     assert_int_equal(calibration.effect[1].chamber, 0);
+    assert_true(calibration.effect[1].latent && !calibration.effect[0].latent);
     assert_relative(calibration.effect[1].parameter[0], 0.0765, 1e-7);
     assert_relative(calibration.effect[1].parameter[1], 1.25, 1e-7);
     assert_relative(calibration_onset_s(&calibration), 4.25, 1e-6);
@@ -149,6 +150,8 @@ static void bad_files_are_refused_with_line_and_key(void **state) {
         {"form: 1", "form: -1", "5: form: '-1' is no whole number"},
         {"form: 1", "chamber: 1", "5: chamber: creep takes no chamber (0), not 1"},
         {"form: 1", "onset_s: -2", "5: onset_s: -2 s is before"},
+        {"form: 1", "latent: 2", "5: latent: creep takes 0 or 1, not 2"},
+        {"    chamber: 2\n", "    chamber: 2\n    latent: 1\n", "10: latent: valve_sluggish remembers nothing"},
         {"value: 0.1", "value: 0.9", "8: value: amplitude of creep takes 0 to 0.5, not 0.9"},
         {"value: 2,", "value: .inf,", "9: value: '.inf' is no finite number"},
         {"value: 2,", "value: 2ms,", "9: value: '2ms' is no finite number (in SI units, without its unit)"},

@@ -115,6 +115,19 @@ static void effect_that_sets_in_late_is_not_taken_for_another(void **state) {
     }
 }
 
+/* Rubber that had crept unseen goes on from there. */
+static void what_remembers_from_before_its_onset_is_seen_to(void **state) {
+    (void)state;
+    diagnosed_open(&diagnosed,
+                   &(struct recording){.effect = {"creep:amplitude=0.08,time_constant=4,onset=8,latent=1"}, .seconds = 16.0, .seed = 2},
+                   NULL);
+    assert_verdict(diagnosis, GAP_EFFECT);
+    assert_string_equal(diagnosis->effect[0].kind->name, "creep");
+    assert_true(diagnosis->effect[0].latent);
+    assert_close(diagnosis->effect[0].onset_s, 8.0, 0.3);
+    diagnosed_close(&diagnosed);
+}
+
 /* More than the largest volume: the fit ends at the bound, and what it ends at is not named. */
 static void size_at_its_bound_is_not_believed(void **state) {
     (void)state;
@@ -226,6 +239,7 @@ int main(void) {
         cmocka_unit_test(repeats_from_mid_run_have_their_onset_and_share),
         cmocka_unit_test(effect_from_mid_run_has_its_onset),
         cmocka_unit_test(effect_that_sets_in_late_is_not_taken_for_another),
+        cmocka_unit_test(what_remembers_from_before_its_onset_is_seen_to),
         cmocka_unit_test(size_at_its_bound_is_not_believed),
         cmocka_unit_test(gain_of_all_sensors_is_not_taken_for_another),
         cmocka_unit_test(any_number_of_threads_says_the_same), cmocka_unit_test(stop_ends_the_search_soon)};
