@@ -4,6 +4,7 @@
 #include <string.h>
 
 #include "cli/commands.h"
+#include "cli/report_json.h"
 #include "log/candump.h"
 #include "log/lcm_log.h"
 #include "log/mapping_import.h"
@@ -19,6 +20,7 @@ struct arguments {
     enum import_format format;
     const char *mapping;
     int node;
+    bool json;
     const char *module;
     const char *source;
     const char *output;
@@ -37,6 +39,7 @@ static const struct argp_option options[] = {
     {"set", 's', "COLUMN=VALUE", 0, "what the file does not say, such as p1_cmd_pa=300mbar; may be repeated",
      1},
     {"module", 'm', "NAME", 0, "the module that was recorded", 1},
+    {"json", 'j', NULL, 0, "for programs: the summary as one JSON object", 1},
     {"output", 'o', "RUN.csv", 0, "the run log to write (required)", 1},
     {0}};
 
@@ -94,6 +97,9 @@ static error_t parse(int key, char *argument, struct argp_state *state) {
         return 0;
     case 's':
         parse_setting(state, argument, arguments);
+        return 0;
+    case 'j':
+        arguments->json = true;
         return 0;
     case 'm':
         arguments->module = argument;
@@ -168,10 +174,28 @@ static bool read_source(const struct arguments *arguments, struct run_log *log, 
     }
 }
 
+static double last_s_of(const struct run_log *log) {
+    return log->value[(log->rows - 1) * log->columns + (size_t)run_log_column(log, "time_s")];
+}
+
+static int print_json(const struct arguments *arguments, const struct run_log *log) {
+    json_t *object = json_object(), *columns = json_array(), *metadata = json_object();
+    for (size_t c = 0; c < log->columns; c++) {
+        (void)json_array_append_new(columns, json_string(log->name[c]));
+    }
+    for (size_t p = 0; p < log->metadata_count; p++) {
+        (void)json_object_set_new(metadata, log->metadata[p].key, json_string(log->metadata[p].value));
+    }
+    (void)json_object_set_new(object, "rows", json_integer((json_int_t)log->rows));
+    (void)json_object_set_new(object, "last_s", json_real(last_s_of(log)));
+    (void)json_object_set_new(object, "columns", columns);
+    (void)json_object_set_new(object, "metadata", metadata);
+    (void)json_object_set_new(object, "wrote", json_string(arguments->output));
+    return report_json_print(object);
+}
+
 static void print_summary(const struct arguments *arguments, const struct run_log *log) {
-    const size_t time = (size_t)run_log_column(log, "time_s");
-    const double last_s = log->value[(log->rows - 1) * log->columns + time];
-    printf("rows      %zu over %.3f s\ncolumns  ", log->rows, last_s);
+    printf("rows      %zu over %.3f s\ncolumns  ", log->rows, last_s_of(log));
     for (size_t c = 0; c < log->columns; c++) {
         printf(" %s", log->name[c]);
     }
@@ -198,6 +222,8 @@ int cli_import(int argc, char **argv) {
         code = program_fail(EXIT_OUTPUT, "out of memory");
     } else if (!run_log_write(arguments.output, &log, error, sizeof error)) {
         code = program_fail(EXIT_OUTPUT, "%s", error);
+    } else if (arguments.json) {
+        code = print_json(&arguments, &log);
     } else {
         print_summary(&arguments, &log);
     }

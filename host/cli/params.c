@@ -6,6 +6,7 @@
 #include <string.h>
 
 #include "cli/parameter_file.h"
+#include "cli/report_json.h"
 #include "cli/transfer.h"
 #include "link/can_board.h"
 
@@ -158,6 +159,19 @@ static int run_backup(struct bus *bus, const struct arguments *arguments) {
     return EXIT_OK;
 }
 
+static int print_differences_json(const struct parameter_values *file, const struct parameter_values *board) {
+    json_t *object = json_object();
+    for (uint32_t p = 0; p < (uint32_t)PARAMETER_COUNT; p++) {
+        const enum parameter_index index = (enum parameter_index)p;
+        if (file->given[p] && file->value[p] != board->value[p]) {
+            (void)json_object_set_new(object, parameter_words(index)->name,
+                                      json_pack("{s:f,s:f}", "board", parameter_number(index, board->value[p]), "file",
+                                                parameter_number(index, file->value[p])));
+        }
+    }
+    return report_json_print(object);
+}
+
 /* Only the file's differences are printed; with none, nothing is. */
 static int run_diff(struct bus *bus, const struct arguments *arguments) {
     struct parameter_values file, board = {.given = {false}};
@@ -166,6 +180,9 @@ static int run_diff(struct bus *bus, const struct arguments *arguments) {
         return program_fail(EXIT_BAD_INPUT, "%s", error);
     }
     const int code = get_all(bus, arguments, &board);
+    if (code == EXIT_OK && arguments->json) {
+        return print_differences_json(&file, &board);
+    }
     for (uint32_t p = 0; p < (uint32_t)PARAMETER_COUNT && code == EXIT_OK; p++) {
         if (file.given[p] && file.value[p] != board.value[p]) {
             const enum parameter_index index = (enum parameter_index)p;
@@ -211,7 +228,7 @@ static const struct action actions[] = {{"list", 0, "list", run_list},
 /* --- the command line */
 
 static const struct argp_option options[] = {
-    {"json", 'j', NULL, 0, "list and get: for programs, one JSON object", 0}, {0}};
+    {"json", 'j', NULL, 0, "list, get and diff: for programs, one JSON object", 0}, {0}};
 
 static const struct action *find_action(const char *name) {
     for (size_t i = 0; name != NULL && i < sizeof actions / sizeof actions[0]; i++) {

@@ -38,7 +38,7 @@ int transfer_image(struct bus *bus, const struct bus_options *options, enum tran
     }
     switch (result) {
     case CAN_BOARD_OK:
-        printf("sent      %u bytes in %" PRIu64 " frames, %" PRIu64 " bytes of them again\n", bytes,
+        fprintf(options->json ? stderr : stdout, "sent      %u bytes in %" PRIu64 " frames, %" PRIu64 " bytes of them again\n", bytes,
                transfer.frames, transfer.again);
         return EXIT_OK;
     case CAN_BOARD_REFUSED:

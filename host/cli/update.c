@@ -5,9 +5,12 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "cli/report_json.h"
 #include "cli/transfer.h"
 #include "link/can_board.h"
 #include "program/input_file.h"
+
+#define HASH_BYTES 17
 
 enum { ANY_MODULE = 0x100, UNCHECKED, NO_RESET };
 
@@ -22,6 +25,7 @@ struct arguments {
 static const struct argp_option options[] = {
     {"any-module", ANY_MODULE, NULL, 0, "also a table of another module than the one that runs", 0},
     {"unchecked", UNCHECKED, NULL, 0, "leave it to the board alone to judge the table", 0},
+    {"json", 'j', NULL, 0, "for programs: one JSON object", 0},
     {"no-reset", NO_RESET, NULL, 0, "the board uses it from its next start on, whenever that is", 0},
     {0}};
 
@@ -30,6 +34,9 @@ static error_t parse(int key, char *argument, struct argp_state *state) {
     switch (key) {
     case ARGP_KEY_INIT:
         state->child_inputs[0] = &arguments->bus;
+        return 0;
+    case 'j':
+        arguments->bus.json = true;
         return 0;
     case ANY_MODULE:
         arguments->any_module = true;
@@ -81,18 +88,33 @@ static int start_anew(struct bus *bus, uint64_t hash) {
                             "the board started with table %016" PRIx64 ", not with %016" PRIx64,
                             bus->identity.table_hash, hash);
     }
-    printf("runs      table %016" PRIx64 " of module %s\n", bus->identity.table_hash, bus->identity.module);
     return EXIT_OK;
+}
+
+static int print_json(const struct bus *bus, uint64_t before, bool restarted) {
+    char was[HASH_BYTES], runs[HASH_BYTES];
+    (void)snprintf(was, sizeof was, "%016" PRIx64, before);
+    (void)snprintf(runs, sizeof runs, "%016" PRIx64, restarted ? bus->identity.table_hash : before);
+    return report_json_print(json_pack("{s:s,s:s,s:s,s:b}", "table_before", was, "table", runs, "module",
+                                       restarted ? bus->identity.module : bus->module_name, "restarted", restarted));
 }
 
 static int update(struct bus *bus, const struct arguments *arguments, const uint8_t *image, size_t bytes,
                   uint64_t hash) {
     const uint64_t before = bus->table_hash;
-    printf("board     table %016" PRIx64 " of module %s\n", before, bus->module_name);
+    const bool restarts = !arguments->no_reset;
+    fprintf(arguments->bus.json ? stderr : stdout, "board     table %016" PRIx64 " of module %s\n", before,
+            bus->module_name);
     int code = transfer_image(bus, &arguments->bus, TRANSFER_KIND_TABLE, image, (uint32_t)bytes,
                               arguments->any_module);
-    if (code == EXIT_OK && !arguments->no_reset) {
+    if (code == EXIT_OK && restarts) {
         code = start_anew(bus, hash);
+    }
+    if (code == EXIT_OK && arguments->bus.json) {
+        return print_json(bus, before, restarts);
+    }
+    if (code == EXIT_OK && restarts) {
+        printf("runs      table %016" PRIx64 " of module %s\n", bus->identity.table_hash, bus->identity.module);
     }
     return code;
 }

@@ -29,6 +29,13 @@ gives() {
     local status=$?
     [ "$status" -eq "$code" ] && cat "$scratch/out" "$scratch/err" | grep -qE -- "$pattern"
 }
+# object EXPRESSION ARGUMENTS: in Python, of the object o, all that is on standard output
+object() {
+    local expression=$1
+    shift
+    timeout 120 "$tribend" "$@" >"$scratch/out" 2>"$scratch/err" </dev/null &&
+        python3 -c 'import json, sys; o = json.load(open(sys.argv[1])); assert eval(sys.argv[2]), o' "$scratch/out" "$expression" 2>>"$scratch/err"
+}
 says_no_difference() {
     "$tribend" params diff "$scratch/backup.json" --bus "$bus" >"$scratch/out" 2>"$scratch/err" && [ ! -s "$scratch/out" ]
 }
@@ -124,6 +131,8 @@ check parameters_backed_up $?
 gives 0 'tip_gain is 0\.3' params set tip_gain 0.3 --bus "$bus"
 gives 0 'tip_gain +board 0\.3, file 0\.15' params diff "$scratch/backup.json" --bus "$bus"
 check parameters_differ $?
+object 'o == {"tip_gain": {"board": 0.3, "file": 0.15}}' params diff "$scratch/backup.json" --json --bus "$bus"
+check differences_as_json $?
 gives 0 'restored' params restore "$scratch/backup.json" --bus "$bus"
 check parameters_restored $?
 says_no_difference
@@ -156,6 +165,8 @@ check update_without_a_table $?
 "$build/tribend-tables" build paper-semicircle --nodes 4 --mesh-size 1.5mm -q -o "$scratch/small.tbt" >"$scratch/out" 2>"$scratch/err"
 gives 0 'runs +table' update "$scratch/small.tbt" -q --bus "$bus"
 check table_is_sent_and_runs_after_a_new_start $?
+object 'o["restarted"] and o["table"] == o["table_before"] and o["module"] == "paper-semicircle"' update "$scratch/small.tbt" --json --bus "$bus"
+check update_as_json $?
 gives 0 'tip_gain +0\.15 ' params get tip_gain --bus "$bus"
 check saved_parameters_outlast_the_new_start $?
 gives 0 '"state":"SAFE"' monitor --json --for 1s --bus "$bus"

@@ -110,6 +110,10 @@ for one in "${!writes[@]}"; do
     gives 5 'closed/f.*[Pp]ermission denied' $one ${writes[$one]}
     check "${one/ /_}_names_a_folder_that_it_may_not_write" $?
 done
+"$tribend" import "$scratch/candump" --candump -o "$scratch/imported.csv" --json >"$scratch/out" 2>"$scratch/err" &&
+    python3 -c 'import json, sys; o = json.load(sys.stdin); assert o["rows"] >= 1 and o["wrote"] == sys.argv[1] and "time_s" in o["columns"]' \
+        "$scratch/imported.csv" <"$scratch/out" 2>>"$scratch/err"
+check import_as_json $?
 # said before the work, which takes several seconds of processor time
 long_works=("gap plan --group line_volume,line_resistance -q -o $scratch/closed/f"
     "gap plan --group line_volume,line_resistance -q -o $scratch/new.yaml --json $scratch/closed/f"
