@@ -19,7 +19,7 @@
 #define TRACE_SHARE 0.98      /* .. and of a trace, .. */
 #define TRACE_SIGNAL 10.0     /* .. which is so many times what is worth explaining at all */
 /* Of pressures that no effect acts on yet: so much is no form's doing, and an effect must explain all but that. */
-#define UNTOUCHED_LEAST 0.1
+#define UNTOUCHED_LEAST 0.3
 #define UNTOUCHED_LEFT 0.15
 /* Of a faint gap: more than that left means that something else was meant, but for what chance makes of so little. */
 #define FAINT_LEFT 0.25
@@ -108,12 +108,13 @@ static bool acts_on_pressures(const struct gap_model *model) {
     return acts;
 }
 
-/* Geometry and timing of sensors have no other form than theirs. */
+/* Geometry, scale and timing of sensors have no other form than theirs. */
 static bool is_exact(const struct gap_model *model) {
     bool exact = true;
     for (size_t e = 0; e < model->count; e++) {
         const struct effect_kind *kind = model->effect[e].kind;
-        exact = exact && kind->stage == EFFECT_STAGE_TIP_SENSOR && kind->forms < 2;
+        const bool sensor = kind->stage == EFFECT_STAGE_TIP_SENSOR || kind->stage == EFFECT_STAGE_PRESSURE_SENSOR;
+        exact = exact && sensor && kind->forms < 2;
     }
     return exact;
 }

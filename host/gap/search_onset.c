@@ -82,16 +82,16 @@ static void refine_onset(struct search_crew *crew, double width_s, size_t e, str
     }
 }
 
-/* What remembers may do so from before its onset, and then sets in at another time. */
-static void try_latent(struct search_crew *crew, double width_s, size_t e, struct fit *fit) {
-    struct fit latent = *fit;
-    if (!latent.model.effect[e].kind->remembers) {
+/* What remembers may do so from before its onset, or from there on only, and then sets in at another time. */
+static void try_memory(struct search_crew *crew, double width_s, size_t e, struct fit *fit) {
+    struct fit other = *fit;
+    if (!other.model.effect[e].kind->remembers) {
         return;
     }
-    latent.model.effect[e].latent = true;
-    fitter_run(&crew->fitter[0], &latent, ONSET_ROUNDS, true);
-    refine_onset(crew, width_s, e, &latent);
-    *fit = all_squares(&latent) < all_squares(fit) ? latent : *fit;
+    other.model.effect[e].latent = !other.model.effect[e].latent;
+    fitter_run(&crew->fitter[0], &other, ONSET_ROUNDS, true);
+    refine_onset(crew, width_s, e, &other);
+    *fit = all_squares(&other) < all_squares(fit) ? other : *fit;
 }
 
 /* When did each effect set in? Tried on a grid, then closer and closer; kept where it explains more. */
@@ -105,7 +105,7 @@ static void find_onset(struct search_crew *crew, double end_s, size_t e, struct 
     }
     *fit = *best;
     refine_onset(crew, width_s, e, fit);
-    try_latent(crew, width_s, e, fit);
+    try_memory(crew, width_s, e, fit);
     /* a real onset leaves little; a form that is somewhat off gains a little by any */
     if (before.model.effect[e].onset_s == 0.0 &&
         search_structure(fit) > ONSET_LEAVES * search_structure(&before)) {

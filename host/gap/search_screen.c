@@ -17,6 +17,12 @@
 #define FORM_COST 0.003    /* ... a form more of the same by that */
 #define SHORTLIST 10       /* of the candidates that act on the gas; the best variant of each kind besides */
 
+/* What remembers may have done so before. */
+static void set_onset(const struct search *search, struct effect *effect) {
+    effect->onset_s = search->onset_s;
+    effect->latent = search->onset_s > 0.0 && effect->kind->remembers;
+}
+
 /* For an order: of two that explain the same, the one with fewer parts goes first. */
 static double rank(const struct fit *fit) {
     return search_held_out(fit) *
@@ -48,7 +54,7 @@ static size_t place_starts(struct fitter *fitter, const struct search *search, c
         effect_init(&effect, candidate->kind);
         effect.chamber = candidate->chamber;
         effect.form = candidate->form;
-        effect.onset_s = search->onset_s;
+        set_onset(search, &effect);
         (void)search_place_start(candidate->kind, k, &effect);
         gap_model_add(&model, &effect);
         const double gain = fitter_gain(fitter, &model, &share);
@@ -87,7 +93,7 @@ static void screen_one(struct fitter *fitter, const struct search *search, const
         effect_init(&effect, candidate->kind);
         effect.chamber = candidate->chamber;
         effect.form = candidate->form;
-        effect.onset_s = search->onset_s;
+        set_onset(search, &effect);
         (void)search_place_start(candidate->kind, k, &effect);
         effect = many ? placed[k] : effect;
         if (candidate->kind->by_chance) {
@@ -141,7 +147,7 @@ static void shortlist(struct search *search, struct search_crew *crew, const str
             effect_init(&effect, kind);
             effect.chamber = 0;
             effect.form = list[i].form;
-            effect.onset_s = search->onset_s;
+            set_onset(search, &effect);
             starts = search_place_start(kind, k, &effect);
             fitter_linear(&crew->fitter[omp_get_thread_num()], crew->fitter[0].base, base_residual, &effect,
                           mine);

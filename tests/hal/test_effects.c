@@ -845,8 +845,8 @@ static void a_hysteresis_loop_is_as_wide_as_it_says_at_any_rate(void **state) {
     const double limit = (double)reference.table.module.bend_limit_rad;
     static const char *const kinds[] = {"hysteresis:width=0.1,memory=0.3", "hysteresis:width=0.05,memory=0.15",
                                         "hysteresis:width=0.05,memory=0.45", "hysteresis:width=0.1,memory=0.3,form=1",
-                                        "hysteresis:width=0.05,memory=0.15,form=1", "hysteresis:width=0.2,memory=0.02",
-                                        "hysteresis:width=0.15,memory=0.05,form=1"};
+                                        "hysteresis:width=0.05,memory=0.15,form=1", "hysteresis:width=0.2,memory=0.05",
+                                        "hysteresis:width=0.18,memory=0.05,form=1"};
     for (size_t i = 0; i < 3 * sizeof kinds / sizeof kinds[0]; i++) {
         const int steps = i % 3 == 0 ? 2 : i % 3 == 1 ? 20 : 2000;
         struct effect effect = make(kinds[i / 3]);
@@ -893,7 +893,7 @@ static void hysteresis_loops_grow_with_their_size_up_to_the_memory(void **state)
 static void a_hysteresis_that_asks_for_too_much_only_stands_still(void **state) {
     (void)state;
     for (size_t form = 0; form < 2; form++) {
-        struct effect effect = make("hysteresis:width=0.2,memory=0.02");
+        struct effect effect = make("hysteresis:width=0.2,memory=0.05");
         effect.form = form;
         const double top = bent_to(&effect, 0.0, 1.0, 50), back = bent_to(&effect, 1.0, 0.99, 3);
         assert_true(back < top);

@@ -15,7 +15,8 @@ enum { ALL_SIZES, ONE_SIZE };
 #define PLAYS 5
 #define WIDTH_MOST 0.2
 /* At 1 / PLAYS the bend would stand still wherever the load turns round, and beyond it go on the wrong way: no weight comes
- * near. A loop so wide has a memory that is long enough for it, whatever shorter one is asked for. */
+ * near. A loop so wide has a memory that is long enough for it, whatever shorter one is asked for. Below the least memory that may
+ * be asked for it is not rubber any more but something that sticks and slips. */
 #define WEIGHT_MOST 0.195
 
 /* Radii over the memory. */
@@ -81,7 +82,7 @@ static const struct effect_kind hysteresis = {
     .remembers = true,
     .parameter_count = 2,
     .parameter = {[WIDTH] = {"width", "1", 0.0, WIDTH_MOST, 0.06, 0.0},
-                  [MEMORY] = {"memory", "1", 0.02, 2.0, 0.3, NAN}},
+                  [MEMORY] = {"memory", "1", 0.05, 2.0, 0.3, NAN}},
     .doubt = {[WIDTH] = 0.3, [MEMORY] = 0.5}, /* loops of other shapes: Bouc (1967), Wen (1976) */
     .shape = lag};
 
