@@ -138,7 +138,11 @@ mark
 # what was on the bus last before that, and a second before it
 least=$(awk -v at="$(cat "$SCRATCH/killed_at")" '{ t = substr($1, 2) + 0; if (t <= at) last = t } END { printf "%.6f", last - 1 }' "$dump")
 reaches() { awk -v v="$1" -v least="$least" 'BEGIN { exit !(v >= least && least > 0) }'; }
-reaches "$(tail -n 1 "$SCRATCH/killed.can" | tr -d '()' | cut -d' ' -f1)"
+# a line that was being written when the recorder was killed may be torn
+last_s=$(tail -n 2 "$SCRATCH/killed.can" | awk '{ last = before; before = $1 } END { print last }' | tr -d '()')
+[ -n "$(tail -c 1 "$SCRATCH/killed.can")" ] || last_s=$(tail -n 1 "$SCRATCH/killed.can" | tr -d '()' | cut -d' ' -f1)
+reaches "$last_s" || echo "killed at $(cat "$SCRATCH/killed_at"), wanted $least, has $last_s, $(tail -n 1 "$SCRATCH/killed.can")"
+reaches "$last_s"
 check can_log_is_whole_to_the_last_second $?
 "$tribend" import --lcm "$SCRATCH/killed.lcm" -o "$SCRATCH/killed_lcm.csv" >"$SCRATCH/import.out" 2>&1
 reaches "$(awk '/^# time_zero/ { zero = $3 * 1e-6 } END { split($0, f, ","); printf "%.6f", zero + f[1] }' "$SCRATCH/killed_lcm.csv")"
