@@ -216,9 +216,15 @@ static bool set_parameter(struct effect *effect, const char *name, const char *t
     }
     if (strcmp(name, "latent") == 0 && kind->remembers) {
         double latent;
-        const bool known = read_value(text, kind->name, name, 0.0, 1.0, "1", &latent, error, bytes);
-        effect->latent = known && latent >= 0.5;
-        return known;
+        if (!read_value(text, kind->name, name, 0.0, 1.0, "1", &latent, error, bytes)) {
+            return false;
+        }
+        effect->latent = latent > 0.0;
+        if (effect->latent && latent < 1.0) {
+            (void)snprintf(error, bytes, "effect %s: latent takes 0 or 1, not '%s'", kind->name, text);
+            return false;
+        }
+        return true;
     }
     if (strcmp(name, "form") == 0 && kind->forms > 1) {
         double form;

@@ -128,7 +128,7 @@ bool effect_parse(const char *text, struct effect *effect, char *error, size_t e
 /* Of its law: the least doubt, over the parameters that have one; 0: none has. */
 double effect_doubt(const struct effect_kind *kind);
 bool effect_has(const struct effect_kind *kind, enum effect_hook_kind hook);
-/* Call that hook of each effect that has it, within its chamber and after its onset. */
+/* Call that hook of each effect that has it, within its chamber and after its onset; before that, a latent one unseen. */
 void effects_run(struct effect *effect, size_t count, enum effect_hook_kind hook, struct effect_signals *signals);
 /* For load and shape hooks: the nominal shape at these pressures, on the table's scale. */
 void effect_shape_at(const struct effect_signals *signals, const double load_pa[3], struct body_shape *shape);

@@ -18,6 +18,9 @@ static void print_kind(const struct effect_kind *kind) {
                strcmp(parameter->unit, "1") == 0 ? "" : " ", strcmp(parameter->unit, "1") == 0 ? "" : parameter->unit,
                parameter->typical);
     }
+    if (kind->remembers) {
+        printf("    %-18s 0 or 1, with an onset: what it remembers runs from the start, unseen\n", "latent");
+    }
 }
 
 static json_t *parameters_json(const struct effect_kind *kind) {
@@ -45,6 +48,7 @@ static json_t *kind_json(const struct effect_kind *kind) {
                                                                               : "all or one"));
     (void)json_object_set_new(object, "what", json_string(kind->what));
     (void)json_object_set_new(object, "signature", json_string(kind->signature));
+    (void)json_object_set_new(object, "remembers", json_boolean(kind->remembers));
     (void)json_object_set_new(object, "parameters", parameters_json(kind));
     return object;
 }
@@ -94,7 +98,6 @@ int cli_effects(int argc, char **argv) {
     for (size_t i = 0; i < effect_kind_count(); i++) {
         print_kind(effect_kind_at(i));
     }
-    printf("every effect also takes onset=SECONDS: nothing happens before; creep, hysteresis, mullins and temperature_stiffness then take\n"
-           "latent=1: what they remember runs from the start, unseen\n");
+    printf("every effect also takes onset=SECONDS: nothing happens before\n");
     return EXIT_OK;
 }

@@ -42,7 +42,7 @@ static void print_effect(FILE *out, const struct diagnosis_effect *effect) {
         fprintf(out, ", chamber %zu", effect->chamber);
     }
     if (effect->onset_s > 0.0) {
-        fprintf(out, ", from %.1f s on", effect->onset_s);
+        fprintf(out, ", from %.1f s on%s", effect->onset_s, effect->latent ? " (it remembers what was before)" : "");
     }
     fprintf(out, " (probability %.2f): %s\n", effect->probability, effect->kind->what);
     for (size_t i = 0; i < effect->kind->parameter_count; i++) {
@@ -210,9 +210,10 @@ static json_t *alternatives_json(const struct diagnosis *diagnosis) {
             json_object_set_new(parameters, effect->kind->parameter[k].name,
                                 json_pack("{s:f,s:s}", "value", effect->parameter[k], "unit", effect->kind->parameter[k].unit));
         }
-        json_array_append_new(list, json_pack("{s:s,s:s,s:i,s:i,s:f,s:f,s:f,s:o}", "name", effect->kind->name, "stage",
+        json_array_append_new(list, json_pack("{s:s,s:s,s:i,s:i,s:f,s:b,s:f,s:f,s:o}", "name", effect->kind->name, "stage",
                                               effect_stage_name(effect->kind->stage), "form", (int)effect->form, "chamber",
-                                              (int)effect->chamber, "onset_s", effect->onset_s, "probability",
+                                              (int)effect->chamber, "onset_s", effect->onset_s, "latent",
+                                              effect->latent && effect->onset_s > 0.0, "probability",
                                               entry->probability, "structure", entry->structure, "parameters", parameters));
     }
     return list;

@@ -240,7 +240,7 @@ static void write_effect(FILE *out, const struct diagnosis_effect *effect) {
     if (effect->onset_s > 0.0) {
         fputs("from ", out);
         markup_quantity(out, effect->onset_s, "s");
-        fputs(" on, ", out);
+        fputs(effect->latent ? " on (it remembers what was before), " : " on, ", out);
     }
     fprintf(out, "probability ");
     markup_number(out, effect->probability, 0.05);

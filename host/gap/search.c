@@ -47,7 +47,6 @@ static bool take_repeats(struct search *search, size_t step) {
 static bool begin_anew(struct search *search, struct search_workspace *room, bool rigid) {
     const struct gap_model plain = {.stiffness_scale = 1.0, .supply_scale = 1.0};
     search->replay.rigid = rigid;
-    search->trials = 0;
     room->singles = 0;
     search->nominal.model = plain;
     const bool sound = search_recalibrate(search, &search->nominal, false) &&
@@ -77,12 +76,18 @@ static bool look_again(struct search *search, struct search_workspace *room, boo
  * duties make of them: near ninety degrees a few pascals turn it more than its sensor errs. Where they turn it so far that
  * no fit finds its way, a faint gap of the pressures is looked at by itself after all. */
 static bool look_closer(struct search *search, struct search_workspace *room, bool faint) {
+    search->trials = 0;
     bool sound = look_again(search, room, true);
     if (sound && faint && search->best.model.count == 0 && search_is_structured(&search->best) &&
         !search_stopped(search)) {
+        const size_t trials = search->trials;
         sound = look_again(search, room, false);
         if (sound && search->best.model.count == 0) {
+            search->trials = trials;
             sound = begin_anew(search, room, true);
+        } else { /* those under other weights are not its rivals */
+            search->trials -= trials;
+            memmove(search->trial, search->trial + trials, search->trials * sizeof search->trial[0]);
         }
     }
     return sound;

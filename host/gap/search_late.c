@@ -58,6 +58,7 @@ static bool try_last_part(struct search *search, struct search_workspace *room, 
 bool search_after_onset(struct search *search, struct search_workspace *room) {
     const struct fit before = search->best;
     const double left = share_left(search);
+    const size_t trials = search->trials;
     const bool late = before.model.count > 0 && before.model.effect[0].onset_s > 0.0;
     if (left < (late ? LATE_SHARE : UNEXPLAINED_SHARE) || search_structure(&before) < STRUCTURE_LEAST ||
         search_stopped(search)) {
@@ -71,8 +72,10 @@ bool search_after_onset(struct search *search, struct search_workspace *room) {
     sound = sound && try_last_part(search, room, &least);
     search->best = least;
     sound = sound && (least.model.count == 0 || search_recalibrate(search, &search->best, true));
-    if (!sound || least.model.count == 0 || share_left(search) > left) {
+    const bool earns = before.model.count > 0 || search_earns_place(search, &search->recalibrated, &search->best);
+    if (!sound || least.model.count == 0 || share_left(search) > left || !earns) {
         search->best = before;
+        search->trials = before.model.count > 0 ? search->trials : trials; /* of the last part alone */
         sound = sound && search_recalibrate(search, &search->best, true);
     }
     return sound;

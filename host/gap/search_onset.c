@@ -101,6 +101,9 @@ static void find_onset(struct search_crew *crew, double end_s, size_t e, struct 
     const double width_s = end_s / (ONSETS + 1.0);
     const struct fit *best = try_onsets(crew, &before, e, width_s, width_s, ONSET_ROUNDS, trial);
     if (!search_is_better(&before, best)) {
+        if (before.model.effect[e].onset_s > 0.0) { /* which is right already */
+            try_memory(crew, width_s, e, fit);
+        }
         return;
     }
     *fit = *best;

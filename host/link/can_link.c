@@ -115,7 +115,7 @@ static bool is_said_again(const struct can_link *link, int64_t time_us) {
     const enum supervisor_state state = link->assembly.report.status.state;
     const bool runs = state == SUPERVISOR_ACTIVE || state == SUPERVISOR_HOLD;
     const enum controller_command_kind kind = link->command.kind;
-    if (kind == COMMAND_HOLD && state == SUPERVISOR_ACTIVE) {
+    if (kind == COMMAND_HOLD && state == SUPERVISOR_ACTIVE && !link->silent) {
         return true; /* another host's command came between; a hold starts nothing */
     }
     if (kind == COMMAND_NONE || kind == COMMAND_CLEAR || time_us >= link->commanded_us + link->start_us) {
@@ -238,11 +238,12 @@ static void take_message(struct can_link *link, enum message_id id, const union 
     }
 }
 
-/* Another host's command to our board: from now on it is the stale one. */
+/* Another host's command to our board: from now on it is the stale one. VENT is taken whatever its sequence is. */
 static void take_other_host(struct can_link *link, enum message_id id, const struct hal_can_frame *frame) {
     const union message nothing = {0};
     link->counters.other_hosts++;
-    if (message_row(id)->number >= message_row(MESSAGE_STATUS)->number) {
+    if (id == MESSAGE_VENT || message_row(id)->number >= message_row(MESSAGE_STATUS)->number ||
+        frame->length != message_row(id)->bytes) {
         return;
     }
     command_sequence_pass(&link->sequence, frame->data[0], is_kept_alive(&link->command), now_us());

@@ -254,7 +254,7 @@ static void before_its_onset_a_latent_effect_only_remembers(void **state) {
         assert_memory_equal((const double *)&always.pose + before + 7, (const double *)&late.pose + before + 7,
                             (all - before - 7) * sizeof(double));
     }
-    assert_int_equal(kinds, 4);
+    assert_true(kinds >= 4);
 }
 
 /* All hooks once, the other chambers' signals untouched. */
@@ -892,9 +892,9 @@ static void hysteresis_loops_grow_with_their_size_up_to_the_memory(void **state)
 /* However wide a loop is asked for, the bend never goes the wrong way where the load turns round. */
 static void a_hysteresis_that_asks_for_too_much_only_stands_still(void **state) {
     (void)state;
-    for (size_t form = 0; form < 2; form++) {
-        struct effect effect = make("hysteresis:width=0.2,memory=0.05");
-        effect.form = form;
+    for (size_t i = 0; i < 4; i++) {
+        struct effect effect = make(i < 2 ? "hysteresis:width=0.2,memory=0.05" : "hysteresis:width=0.2,memory=2");
+        effect.form = i % 2;
         const double top = bent_to(&effect, 0.0, 1.0, 50), back = bent_to(&effect, 1.0, 0.99, 3);
         assert_true(back < top);
     }

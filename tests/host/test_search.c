@@ -126,6 +126,12 @@ static void what_remembers_from_before_its_onset_is_seen_to(void **state) {
     assert_true(diagnosis->effect[0].latent);
     assert_close(diagnosis->effect[0].onset_s, 8.0, 0.3);
     diagnosed_close(&diagnosed);
+    diagnosed_open(&diagnosed, &(struct recording){.effect = {"creep:amplitude=0.08,time_constant=4,onset=8"}, .seconds = 16.0, .seed = 2},
+                   NULL);
+    assert_verdict(diagnosis, GAP_EFFECT);
+    assert_true(!diagnosis->effect[0].latent);
+    assert_close(diagnosis->effect[0].onset_s, 8.0, 0.3);
+    diagnosed_close(&diagnosed);
 }
 
 /* More than the largest volume: the fit ends at the bound, and what it ends at is not named. */

@@ -1,6 +1,6 @@
-/* Two hosts and a board in virtual time: one takes over what the other began, from any place of its sequence,
- * over links of any delay and with a frame lost. The board's rule is written again here, in the words of
- * BOARD's page on messages. */
+/* Two hosts and a board in virtual time: one takes over what the other began, from any place of its sequence, over
+ * links of any delay and with a frame lost. The board's rule is written again here, in the words of
+ * docs/messages.md. */
 #include "link/command_sequence.h"
 
 #include "support/test.h"
@@ -167,7 +167,7 @@ static void a_lost_frame_does_not_leave_it_behind(void **state) {
     }
 }
 
-/* Whoever commands alone is never moved by what others were refused before. */
+/* Refusals of what was on its way count once, and half a turn is all that can be missing. */
 static void a_host_alone_turns_at_most_twice(void **state) {
     (void)state;
     struct command_sequence sequence;

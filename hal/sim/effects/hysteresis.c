@@ -1,7 +1,7 @@
 /* Bend depends on where it comes from, not on how fast: a sum of play operators on the bend vector (Prandtl
  * 1928, Ishlinskii 1944; vector play as in Krejci 1996). Loops are closed and centred on the nominal curve.
  *
- * All plays have the same weight; `memory` times the bend limit is the greatest radius. Form 0: radii in a geometric
+ * All plays have the same weight; `memory` times the bend limit is the greatest radius, or what a wide loop needs. Form 0: radii in a geometric
  * series, so that loops of all sizes up to the memory are about as wide for their size, as rubber's are. Form 1: radii spread
  * evenly, so that the bend lags by nearly the same once it has moved by the memory: short cycles hardly open. `width` is the
  * opening of a cycle from zero to the bend limit at half height, over that limit. */
@@ -38,14 +38,18 @@ static double memory_of(size_t form, const double *parameter) {
     return parameter[MEMORY] * sqrt(sqrt(sqrt(1.0 + fourth * fourth)));
 }
 
-/* A play of radius r, weight one, opens a cycle of length one by 2 r, or by what is left of the cycle. */
+/* A play of radius r, weight one, opens a cycle of length one by 2 r, or by what is left of the cycle: plays of long memory open
+ * it less, and their weight is bent smoothly to the greatest one. */
 static double weight_of(size_t form, double width, double memory) {
-    double opening = 0.0;
+    double opening = 0.0, small = 0.0;
     for (size_t i = 0; i < PLAYS; i++) {
         const double radius = shares[form][i] * memory;
+        small += 2.0 * radius;
         opening += fmax(fmin(2.0 * radius, 1.0 - 2.0 * radius), 0.0);
     }
-    return fmin(width / opening, WEIGHT_MOST);
+    const double least = fmin(width / small, WEIGHT_MOST), room = fmax(WEIGHT_MOST - least, 1e-6);
+    const double more = (width / opening - least) / room, fourth = more * more * more * more;
+    return least + room * more / sqrt(sqrt(sqrt(1.0 + fourth * fourth)));
 }
 
 /* The follower stays within the radius of what it follows. */
