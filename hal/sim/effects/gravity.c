@@ -52,6 +52,7 @@ static const struct effect_kind gravity = {
     .parameter = {[ANGLE] = {"angle", "rad", 0.0, M_PI, M_PI / 2.0, NAN},
                   [AZIMUTH] = {"azimuth", "rad", -M_PI, M_PI, 0.0, NAN},
                   [WEIGHT_SCALE] = {"weight_scale", "1", 0.0, 6.0, 1.0, 0.0}},
+    .doubt = {[WEIGHT_SCALE] = 0.1}, /* how the weight is spread, and how the module yields to it off its arc */
     .shape = bend,
     .pose = sag};
 

@@ -35,6 +35,7 @@ static const struct effect_kind temperature_stiffness = {
     .parameter_count = 2,
     .parameter = {[PER_KELVIN] = {"per_kelvin", "1/K", -0.03, 0.03, 0.004, 0.0},
                   [DRIFT] = {"drift", "1/s", -0.01, 0.01, 5e-4, 0.0}},
+    .doubt = {[DRIFT] = 0.25}, /* what nobody measures seldom warms up in a straight line */
     .load = stiffen};
 
 EFFECT_REGISTER(temperature_stiffness);
