@@ -82,7 +82,9 @@ struct effect_kind {
     bool delays;    /* what it does is to be late: in one loop it looks like whatever else is */
     bool by_chance; /* parameter 0 is the probability that it acts at a tip sample (signals->chance below it) */
     bool by_threshold; /* nothing happens on one side of parameter 0: a fit must start on the right one */
-    bool by_sample; /* what it does depends on when the sensor samples: a replay may not leave samples out */
+    /* By how much the tip sensor's poses are older than their times say. A replay, which knows all pressures, takes the pose
+     * of then; the pose hook is for what has but its own past. */
+    double (*age_s)(const double *parameter);
     size_t parameter_count;
     struct effect_parameter parameter[EFFECT_PARAMETERS_MAX];
     double doubt[EFFECT_PARAMETERS_MAX]; /* real causes follow laws of their own: by how much that puts a parameter off where

@@ -125,7 +125,7 @@ static double noise_square(const struct chunks *chunks) {
         total += chunks->noise[i];
         count += chunks->residual[i] - chunks->apart[i];
     }
-    return count > 0.0 ? total / count : 0.0;
+    return count > 0.0 ? fmin(total / count, FIT_NOISE_MOST) : 0.0;
 }
 
 static double share_closed(const struct chunks *before, const struct chunks *after, double floor2,

@@ -283,7 +283,7 @@ double fit_mean_square(const struct fit_sums *sums, int held_out) {
 
 double fit_structure_of(const struct fit_sums *sums, int held_out, enum fit_group group) {
     const struct fit_part *part = &sums->part[held_out][group];
-    const double noise = part->noise_count > 0.0 ? part->noise / part->noise_count : 0.0;
+    const double noise = part->noise_count > 0.0 ? fmin(part->noise / part->noise_count, FIT_NOISE_MOST) : 0.0;
     return part->count > 0.0 ? fmax(part->square / part->count - noise, 0.0) : 0.0;
 }
 

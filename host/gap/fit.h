@@ -16,6 +16,10 @@ struct fit_base {
     struct replay_state moved[2]; /* derivatives by stiffness and supply scale */
 };
 
+/* Whitened, noise alone makes at most that of a mean square; what differs more between neighbouring blocks is an error that
+ * alternates, as that of a pulse's timing does. */
+#define FIT_NOISE_MOST 1.2
+
 enum fit_group { FIT_PRESSURE, FIT_TIP, FIT_GROUPS };
 
 /* Sums over whitened residuals of one group. */
@@ -78,7 +82,8 @@ double fitter_gain(struct fitter *fitter, const struct gap_model *model, double 
 double fit_squares(const struct fit_sums *sums, int held_out);
 double fit_count(const struct fit_sums *sums, int held_out);
 double fit_mean_square(const struct fit_sums *sums, int held_out);
-/* Of one group: mean square less what noise alone makes of it (von Neumann 1941), not below zero: what is left to explain. */
+/* Of one group: mean square less what noise alone makes of it (von Neumann 1941; at most FIT_NOISE_MOST), not below zero: what is
+ * left to explain. */
 double fit_structure_of(const struct fit_sums *sums, int held_out, enum fit_group group);
 /* The same of both, by their counts. */
 double fit_structure(const struct fit_sums *sums, int held_out);

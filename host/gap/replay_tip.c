@@ -38,11 +38,33 @@ static void pressures_at(const struct replay *replay, const struct replay_state 
 
 bool replay_needs_samples(const struct gap_model *model) {
     for (size_t e = 0; e < model->count; e++) {
-        if (model->effect[e].kind->by_sample || model->effect[e].kind->by_chance) {
+        if (model->effect[e].kind->by_chance) {
             return true;
         }
     }
     return false;
+}
+
+/* How old the sensor's poses are at a time. */
+static double age_at(const struct gap_model *model, double time_s) {
+    double age_s = 0.0;
+    for (size_t e = 0; e < model->count; e++) {
+        const struct effect *effect = &model->effect[e];
+        age_s += effect->kind->age_s != NULL && time_s >= effect->onset_s ? effect->kind->age_s(effect->parameter) : 0.0;
+    }
+    return age_s;
+}
+
+/* The model without what only makes poses old. */
+static struct gap_model without_age(const struct gap_model *model) {
+    struct gap_model rest = *model;
+    rest.count = 0;
+    for (size_t e = 0; e < model->count; e++) {
+        if (model->effect[e].kind->age_s == NULL) {
+            gap_model_add(&rest, &model->effect[e]);
+        }
+    }
+    return rest;
 }
 
 void replay_tip_of_run(const struct replay *replay, const struct gap_model *model,
@@ -56,7 +78,9 @@ void replay_tip_of_run(const struct replay *replay, const struct gap_model *mode
     const bool sampled =
         data->sim_tip != NULL && data->sim_pa == NULL; /* what the sensors show is told at each sample */
     const bool picked = replay->coarse && !replay_needs_samples(model) && !sampled;
-    replay_set_up_plant(replay, model, &plant);
+    /* another simulator's poses are known at its samples only */
+    const struct gap_model prompt = data->sim_tip != NULL ? *model : without_age(model);
+    replay_set_up_plant(replay, &prompt, &plant);
     for (size_t n = 0; n < (picked ? run->picks : data->tips); n++) {
         const size_t i = picked ? run->pick[n] : n;
         const struct gap_tip *tip = &data->tip[i];
@@ -71,14 +95,15 @@ void replay_tip_of_run(const struct replay *replay, const struct gap_model *mode
             row++;
         }
         plant.temperature_k = replay_temperature_at(data, row);
-        pressures_at(replay, state, index, tip->time_s, from_duties, nudge_pa, nudged, pressure_pa);
-        const double step_s = fmax(tip->time_s - before_s, 1e-6), chance = tip->repeated ? 0.0 : 1.0;
+        const double time_s = tip->time_s - (data->sim_tip != NULL ? 0.0 : age_at(model, tip->time_s));
+        pressures_at(replay, state, index, time_s, from_duties, nudge_pa, nudged, pressure_pa);
+        const double step_s = fmax(time_s - before_s, 1e-6), chance = tip->repeated ? 0.0 : 1.0;
         if (data->sim_tip != NULL) {
             replay_elsewhere_sample(replay, index, state, &plant, i, pressure_pa, step_s, chance);
         } else {
-            plant_sample_tip(&plant, pressure_pa, tip->time_s, step_s, chance);
+            plant_sample_tip(&plant, pressure_pa, time_s, step_s, chance);
         }
-        before_s = tip->time_s;
+        before_s = time_s;
         if (!isnan(tip->quaternion[0])) {
             rotation_between(tip->quaternion, plant.pose.quaternion, rotation);
         }

@@ -161,25 +161,42 @@ static const struct fit *least_of(const struct rivals *rivals, const struct fit 
 
 /* The logarithm of how much less the rival's residuals of one group speak for it than the best ones there: of
  * two of which each explains a group that the other does not, neither is judged by what its own leaves over.
+ * `without`: what is left without those whose forms err there, by `form`, a share of what they take off.
  */
 static double misfit(const struct rivals *rivals, const struct fit *rival, const struct fit *without,
-                     const struct fit *best, enum fit_group group) {
+                     const struct fit *best, enum fit_group group, double form) {
     const struct fit *least = least_of(rivals, best, group);
     const double count = fmax(least->sums.part[1][group].count, 1.0),
                  structure = fit_structure_of(&least->sums, 1, group);
     const double noise = fmax(squares_of(least, group) / count - structure, 0.1);
     const double taken_off = fmax(squares_of(without, group) - squares_of(least, group), 0.0);
     return (squares_of(rival, group) - squares_of(least, group)) /
-           (FORM_SHARE * taken_off + REST_SHARE * structure * count + NOISE_SQUARES * noise);
+           (form * taken_off + REST_SHARE * structure * count + NOISE_SQUARES * noise);
 }
 
-static void weigh(struct rivals *rivals, const struct fit *without, const struct fit *best) {
+/* How far the forms may err of those that act on the pressures. */
+static double form_of_pressures(const struct gap_model *model) {
+    double form = FORM_SHARE;
+    for (size_t e = 0; e < model->count; e++) {
+        const double doubt = gap_effect_upstream(model->effect[e].kind) ? effect_doubt(model->effect[e].kind) : 0.0;
+        form = fmax(form, doubt * doubt);
+    }
+    return form;
+}
+
+/* Where the effect in this place hardly acts on the pressures, what speaks there is mostly the forms of others. */
+static void weigh(const struct search *search, struct rivals *rivals) {
+    const struct effect_kind *held = search->best.model.effect[rivals->place].kind;
+    const struct fit *best = &search->best, *without = rivals->rest.sound ? &rivals->rest : &search->recalibrated;
+    const bool acts = gap_effect_upstream(held);
+    const struct fit *without_any = acts ? without : &search->recalibrated;
+    const double form = acts ? FORM_SHARE : form_of_pressures(&best->model);
     double sum = 0.0, most = -INFINITY;
     for (size_t i = 0; i < rivals->count; i++) {
         struct rival *rival = &rivals->rival[i];
         const double parameters = parameters_of(&rival->fit.model, rival->kind);
-        rival->belief = -misfit(rivals, &rival->fit, without, best, FIT_PRESSURE) -
-                        misfit(rivals, &rival->fit, without, best, FIT_TIP) -
+        rival->belief = -misfit(rivals, &rival->fit, without_any, best, FIT_PRESSURE, form) -
+                        misfit(rivals, &rival->fit, without, best, FIT_TIP, FORM_SHARE) -
                         0.5 * log(parameters) - parameters / NOISE_SQUARES;
         most = fmax(most, rival->belief);
     }
@@ -233,7 +250,7 @@ static void find_in_place(struct search *search, struct rivals *rivals, struct e
         const struct effect *own = own_effect(&rivals->rival[i].fit, &rest);
         rivals->rival[i].effect = own != NULL ? *own : rivals->rival[i].effect;
     }
-    weigh(rivals, without->sound ? without : &search->recalibrated, &search->best);
+    weigh(search, rivals);
 }
 
 bool rivals_find(struct search *search) {

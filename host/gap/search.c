@@ -1,5 +1,6 @@
 #include "gap/search_parts.h"
 
+#include <math.h>
 #include <stdlib.h>
 #include <string.h>
 
@@ -8,6 +9,7 @@
 #define DISBELIEVED 0.1 /* an effect that its rivals leave so little belief gives way to the best of them, .. */
 #define BELIEVED 0.65   /* .. or to one that would be the verdict */
 #define DOUBTED 0.65    /* a further effect that its rivals leave less is left out, if the others .. */
+#define HOPELESS_SHARE 0.5 /* of the gap: where two effects leave more, a third does not explain it */
 #define EXPLAINED_SHARE 0.03 /* .. leave no more than that of the gap by themselves */
 
 static bool prepare(struct search *search) {
@@ -160,9 +162,10 @@ static const struct fit *ask_rivals(const struct search *search) {
 }
 
 /* Rivals are compared under the final weights: what they show may overturn what the search took on its way.
- */
-static bool compare_rivals(struct search *search) {
+ * Tells whether it did. */
+static bool compare_rivals(struct search *search, bool *overturned) {
     bool sound = true;
+    *overturned = false;
     for (size_t round = 0;
          round <= REVISIONS && sound && !search_stopped(search) && search->best.model.count > 0; round++) {
         search_say(search, "rivals", round, REVISIONS);
@@ -172,7 +175,21 @@ static bool compare_rivals(struct search *search) {
             break;
         }
         search->best = *asked;
+        *overturned = true;
         sound = search_recalibrate(search, &search->best, true);
+    }
+    return sound;
+}
+
+/* What was not worth adding to what the search took may be the rest of what the rivals put there. */
+static bool settle_with_rivals(struct search *search, struct search_workspace *room) {
+    bool overturned;
+    bool sound = compare_rivals(search, &overturned);
+    const size_t count = search->best.model.count;
+    if (sound && overturned && count > 0 && count + 3 <= GAP_EFFECTS_MAX &&
+        gap_model_kinds(&search->best.model) < SEARCH_STEPS_MAX && search_has_rest(search, &search->best) &&
+        !search_stopped(search) && search_add_one(search, room, SEARCH_STEPS_MAX)) {
+        sound = search_recalibrate(search, &search->best, true) && compare_rivals(search, &overturned);
     }
     return sound;
 }
@@ -205,7 +222,8 @@ bool search_run(struct search *search, const struct gap_data *data, const struct
         if (search->best.model.count + 3 > GAP_EFFECTS_MAX) {
             break;
         }
-        if (step > 0 && !search_has_rest(search, &search->best)) {
+        const double left = search_structure(&search->best) / fmax(search_structure(&search->recalibrated), STRUCTURE_LEAST);
+        if ((step > 0 && !search_has_rest(search, &search->best)) || (step > 1 && left > HOPELESS_SHARE)) {
             break;
         }
         const bool found = search_add_one(search, room, step);
@@ -225,7 +243,7 @@ bool search_run(struct search *search, const struct gap_data *data, const struct
         drop_idle(search);
         sound = search_recalibrate(search, &search->best, true);
     }
-    sound = sound && compare_rivals(search);
+    sound = sound && settle_with_rivals(search, room);
     sound = sound && search_fit_everything(search);
     search->interrupted = search_stopped(search);
     free(room);

@@ -7,6 +7,7 @@
 
 #define STARTS_MAX 4
 #define THRESHOLD_STARTS 6
+#define AGE_STARTS 6
 #define STARTS_CHEAP 8     /* where no gas need be replayed */
 #define SMALL_SHARE 0.25   /* of the typical size */
 #define REPEATS_LEAST 0.02 /* share of repeated samples below which none is frozen */
@@ -128,6 +129,11 @@ size_t search_place_start(const struct effect_kind *kind, size_t k, struct effec
         effect->parameter[0] =
             kind->parameter[0].none + share[k] * (kind->parameter[0].typical - kind->parameter[0].none);
         return THRESHOLD_STARTS;
+    }
+    if (kind->age_s != NULL) { /* a tip that pulses with its valves looks nearly the same a period later */
+        static const double share[AGE_STARTS] = {1.0, 0.2, 0.35, 0.6, 1.7, 3.0};
+        effect->parameter[0] = share[k] * kind->parameter[0].typical;
+        return AGE_STARTS;
     }
     if (secondary == 0) {
         return 2;

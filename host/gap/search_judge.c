@@ -8,6 +8,7 @@
 /* Shares of the gap, in pressures or at the tip: */
 #define POLISH_SHARE 0.025  /* less than that is left by any form of the right effect, .. */
 #define EXACT_SHARE 0.01    /* .. less than that by effects that have but one form, .. */
+#define BESIDE_EXACT_SHARE 0.1 /* of the squares that such effects leave, noise and all, that a further one must explain */
 #define FORM_LEAST 0.0005   /* .. less than that by most forms of it, .. */
 #define TRACE_LEAST 0.00005 /* .. and less than that by all: no effect is sought for it */
 /* Shares of the whole gap: */
@@ -16,6 +17,7 @@
 #define LAW_AT_TIP 0.2      /* of a law's doubt: what it leaves at the tip, where six coordinates hold it */
 #define WHOLE_SHARE 0.95      /* of such a small rest, that an effect must explain, .. */
 #define UNEXPLAINED_MOST 0.1  /* .. but for what its own law may leave, at most that, .. */
+#define FORESTALLED_SHARE 0.25 /* of what is left, that another explains more of */
 #define TRACE_SHARE 0.98      /* .. and of a trace, .. */
 #define TRACE_SIGNAL 10.0     /* .. which is so many times what is worth explaining at all */
 /* Of pressures that no effect acts on yet: so much is no form's doing, and an effect must explain all but that. */
@@ -120,30 +122,56 @@ static bool is_exact(const struct gap_model *model) {
 }
 
 /* A further effect must be the rest of the explanation, of the pressures or of the tip; not polish on a form
- * that only nearly fits. A small rest may as well be the form: of that, a simple effect must explain nearly
- * all, as no form's error is likely to be just what another effect does. */
+ * that only nearly fits. A small rest may as well be the form: the smaller its share of the gap is, the more of it must a
+ * simple effect explain, as no form's error is likely to be just what another effect does. */
+static bool completes_in(const struct search *search, const struct fit *before, const struct fit *after, enum fit_group group) {
+    const struct effect_kind *kind = after->model.effect[added(before, after)].kind;
+    const bool simple = parts_of(after, kind) == 1 && !kind->forms_add;
+    const double law = effect_doubt(kind), unexplained = fmin(fmax(1.0 - WHOLE_SHARE, law * law), UNEXPLAINED_MOST);
+    const double left = fit_structure_of(&before->sums, 1, group), then = fit_structure_of(&after->sums, 1, group);
+    const double polish = is_exact(&before->model) ? EXACT_SHARE : POLISH_SHARE;
+    const double share = left / fmax(fit_structure_of(&search->recalibrated.sums, 1, group), left);
+    const bool halves = then < (1.0 - COMPLETING_SHARE) * left;
+    const bool most = then < (1.0 - COMPLETING_SHARE) * share / polish * left;
+    const bool whole = left > 3.0 * STRUCTURE_LEAST && then < fmax(unexplained * left, STRUCTURE_LEAST);
+    const bool trace = left > TRACE_SIGNAL * STRUCTURE_LEAST && then < (1.0 - TRACE_SHARE) * left;
+    const double form = form_share(before, group);
+    const bool untouched = group == FIT_PRESSURE && !acts_on_pressures(&before->model) && left > UNTOUCHED_LEAST &&
+                           then < UNTOUCHED_LEFT * left;
+    const bool of_form = is_left(search, before, group, fmax(FORM_LEAST, form), ELSEWHERE_SHARE);
+    return (simple && untouched) || (is_left(search, before, group, polish, MATERIAL_SHARE) && halves) ||
+           (simple && ((of_form && (whole || most)) ||
+                       (is_left(search, before, group, fmax(TRACE_LEAST, form), ELSEWHERE_SHARE) && trace)));
+}
+
+/* What exact effects leave is no form of theirs: be it ever so little, a further one that explains it is there. */
+static bool completes_exact(const struct fit *before, const struct fit *after) {
+    const struct effect_kind *kind = after->model.effect[added(before, after)].kind;
+    const bool simple = parts_of(after, kind) == 1 && !kind->forms_add;
+    const double gain = search_held_out(before) - search_held_out(after);
+    return simple && is_exact(&before->model) && gain > BESIDE_EXACT_SHARE * search_held_out(before) &&
+           search_structure(after) < fmin((1.0 - COMPLETING_SHARE) * search_structure(before), STRUCTURE_LEAST);
+}
+
 static bool completes(const struct search *search, const struct fit *before, const struct fit *after) {
     const struct effect_kind *kind = after->model.effect[added(before, after)].kind;
-    const bool simple = parts_of(after, kind) == 1;
-    const double law = effect_doubt(kind), unexplained = fmin(fmax(1.0 - WHOLE_SHARE, law * law), UNEXPLAINED_MOST);
-    bool any = false;
+    bool any = completes_exact(before, after);
     for (int g = gap_effect_upstream(kind) ? FIT_PRESSURE : FIT_TIP; g < FIT_GROUPS; g++) {
-        const enum fit_group group = (enum fit_group)g;
-        const double left = fit_structure_of(&before->sums, 1, group),
-                     then = fit_structure_of(&after->sums, 1, group);
-        const bool halves = then < (1.0 - COMPLETING_SHARE) * left;
-        const bool whole =
-            left > 3.0 * STRUCTURE_LEAST && then < fmax(unexplained * left, STRUCTURE_LEAST);
-        const bool trace = left > TRACE_SIGNAL * STRUCTURE_LEAST && then < (1.0 - TRACE_SHARE) * left;
-        const double form = form_share(before, group);
-        const bool untouched = group == FIT_PRESSURE && !acts_on_pressures(&before->model) && left > UNTOUCHED_LEAST &&
-                               then < UNTOUCHED_LEFT * left;
-        const double polish = is_exact(&before->model) ? EXACT_SHARE : POLISH_SHARE;
-        any = any || (simple && untouched) || (is_left(search, before, group, polish, MATERIAL_SHARE) && halves) ||
-              (simple && ((is_left(search, before, group, fmax(FORM_LEAST, form), ELSEWHERE_SHARE) && whole) ||
-                          (is_left(search, before, group, fmax(TRACE_LEAST, form), ELSEWHERE_SHARE) && trace)));
+        any = any || completes_in(search, before, after, (enum fit_group)g);
     }
     return any;
+}
+
+bool search_is_forestalled(const struct search *search, const struct fit *before, const struct fit *after,
+                           const struct fit *other) {
+    bool any = before->model.count > 0 && search_held_out(other) < search_held_out(after);
+    for (int g = 0; g < FIT_GROUPS; g++) {
+        const enum fit_group group = (enum fit_group)g;
+        const double left = fit_structure_of(&before->sums, 1, group), then = fit_structure_of(&after->sums, 1, group);
+        const bool more = then - fit_structure_of(&other->sums, 1, group) > FORESTALLED_SHARE * left;
+        any = any && (more || !completes_in(search, before, after, group));
+    }
+    return any && parts_of(other, other->model.effect[added(before, other)].kind) == 1;
 }
 
 /* The same kind twice, though its forms are alternatives and do not add up. */
@@ -168,7 +196,8 @@ bool search_earns_place(const struct search *search, const struct fit *before, c
     }
     const size_t place = added(before, after);
     const bool adds = after->model.effect[place].kind->forms_add || gap_model_is_part(&after->model, place);
-    if (adds && gap_model_kinds(&after->model) <= gap_model_kinds(&before->model) &&
+    const bool known = parts_of(before, after->model.effect[place].kind) > 0;
+    if (known && adds && gap_model_kinds(&after->model) <= gap_model_kinds(&before->model) &&
         !repeats_kind(&after->model)) {
         return search_is_better(before, after); /* more of the same kind */
     }

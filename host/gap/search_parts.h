@@ -97,6 +97,9 @@ double search_gain_by_noise(const struct fit *after);
 bool search_is_better(const struct fit *before, const struct fit *after);
 /* .. and does it have one: is it what there is to explain, or the rest of that? */
 bool search_earns_place(const struct search *search, const struct fit *before, const struct fit *after);
+/* Does another single effect that explains more altogether also explain clearly more of just what gives the second its place? */
+bool search_is_forestalled(const struct search *search, const struct fit *before, const struct fit *after,
+                           const struct fit *other);
 
 /* --- search_onset.c --- */
 

@@ -30,6 +30,9 @@ bool search_add_one(struct search *search, struct search_workspace *room, size_t
         search_refine(search, &crew, room->order, count, step);
         for (size_t i = 0; i < count && !found; i++) {
             found = search_earns_place(search, &search->best, room->order[i]);
+            for (size_t j = 0; j < i && found; j++) {
+                found = !search_is_forestalled(search, &search->best, room->order[i], room->order[j]);
+            }
             next = found ? *room->order[i] : next;
         }
         for (size_t i = 0; step == 0 && i < count && i < PAIRED_MAX; i++) {

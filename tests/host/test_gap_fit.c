@@ -19,14 +19,17 @@ struct bench {
     bool chosen_late; /* what the replay itself took the duties' timing for */
 };
 
-/* `ahead`: by so many rows the log's duties come before ours. */
-static void bench_open_ahead(struct bench *bench, const struct recording *recording, size_t ahead) {
+/* `ahead`: by so many rows the log's duties come before ours. `old_s`: by so much its tip poses are older than they say. */
+static void bench_open_shifted(struct bench *bench, const struct recording *recording, size_t ahead, double old_s) {
     struct plant_parameters nominal;
     struct replay_state state;
     plant_default_parameters(&nominal);
     recording_take(recording, &bench->data);
     struct gap_run *run = &bench->data.run[0];
     memmove(run->duty, run->duty + 3 * ahead, 3 * (run->rows - ahead) * sizeof run->duty[0]);
+    for (size_t i = 0; i < run->tips; i++) {
+        run->tip[i].time_s += old_s;
+    }
     assert_true(replay_open(&bench->fine, &bench->data, &recording_table.table, &nominal));
     assert_true(replay_open_coarse(&bench->coarse, &bench->fine));
     assert_true(replay_state_open(&state, &bench->fine));
@@ -39,7 +42,7 @@ static void bench_open_ahead(struct bench *bench, const struct recording *record
 }
 
 static void bench_open(struct bench *bench, const struct recording *recording) {
-    bench_open_ahead(bench, recording, 0);
+    bench_open_shifted(bench, recording, 0, 0.0);
 }
 
 static void bench_close(struct bench *bench) {
@@ -146,6 +149,32 @@ static void coarse_replay_tells_what_an_effect_changes(void **state) {
     bench_close(&bench);
 }
 
+/* Between two samples the tip pulses as the valves do: poses of then are taken, none between those of the samples. */
+static void old_poses_are_those_of_then(void **state) {
+    static const double old_s[] = {0.0, 0.0123, 0.0305, 0.05};
+    static struct bench bench;
+    double prompt_rms = 0.0;
+    (void)state;
+    for (size_t i = 0; i < sizeof old_s / sizeof old_s[0]; i++) {
+        struct gap_model model = model_with("tip_latency");
+        struct stand stand;
+        double sum = 0.0;
+        model.effect[0].parameter[0] = old_s[i];
+        bench_open_shifted(&bench, &(struct recording){.seconds = SECONDS, .silent = true}, 0, old_s[i]);
+        stand_open(&stand, &bench, false, &model);
+        fitter_evaluate(&stand.fitter, &model);
+        const struct replay_run *run = &bench.fine.run[0];
+        for (size_t k = run->tip_at; k < run->tip_at + REPLAY_TIP_CHANNELS * run->tip_blocks; k += REPLAY_TIP_CHANNELS) {
+            sum += bench.fine.weight[k] > 0.0 ? pow(stand.fitter.residual[k] / bench.fine.weight[k], 2.0) : 0.0;
+        }
+        const double rms_m = sqrt(sum / (double)run->tip_blocks);
+        prompt_rms = i == 0 ? rms_m : prompt_rms;
+        assert_under(rms_m, 1.5 * prompt_rms);
+        stand_close(&stand);
+        bench_close(&bench);
+    }
+}
+
 /* --- parameters --- */
 
 /* Of each stage one, to be found from the catalogue's typical values. */
@@ -225,8 +254,8 @@ static void duties_count_when_they_act_whatever_is_wrong(void **state) {
     (void)state;
     for (size_t i = 0; i < sizeof wrong / sizeof wrong[0]; i++) {
         for (int silent = 0; silent < 2; silent++) {
-            bench_open_ahead(&bench, &(struct recording){.effect = {wrong[i]}, .seconds = SECONDS, .seed = 5, .silent = silent == 1},
-                             PERIOD_ROWS - 1);
+            bench_open_shifted(&bench, &(struct recording){.effect = {wrong[i]}, .seconds = SECONDS, .seed = 5, .silent = silent == 1},
+                             PERIOD_ROWS - 1, 0.0);
             if (!bench.chosen_late) {
                 fail_msg("taken to count at once, with %s%s", wrong[i], silent == 1 ? ", without noise" : "");
             }
@@ -330,6 +359,28 @@ static double mean_added(const struct replay *replay, int held_out, enum fit_gro
     return sum / count;
 }
 
+/* Neighbours differ by what errs now in one way and now in the other, too. */
+static void error_that_alternates_is_not_taken_for_noise(void **state) {
+    static struct bench bench;
+    struct fit before, after;
+    (void)state;
+    bench_open(&bench, &(struct recording){.seconds = SECONDS, .seed = 50});
+    struct gap_run *run = &bench.data.run[0];
+    evaluate_plain(&bench, &before);
+    for (size_t i = 0; i < run->tips; i++) {
+        const double since_s = run->tip[i].time_s - 1e-6 * (double)bench.fine.run[0].start_us;
+        run->tip[i].position_m[0] += (long)(since_s / REPLAY_TIP_BLOCK_S) % 2 == 0 ? 1e-3 : -1e-3;
+    }
+    evaluate_plain(&bench, &after);
+    for (int out = 0; out < 2; out++) {
+        const struct fit_part *part = &after.sums.part[out][FIT_TIP];
+        assert_true(part->noise / part->noise_count > 10.0); /* most of it, by its neighbours */
+        assert_true(fit_structure_of(&after.sums, out, FIT_TIP) > part->square / part->count - 1.5);
+        assert_under(fit_structure_of(&before.sums, out, FIT_TIP), 0.2);
+    }
+    bench_close(&bench);
+}
+
 static void known_signal_raises_the_structure_by_its_square(void **state) {
     enum { BLOCKS_MAX = 1024 };
     static struct bench bench;
@@ -425,12 +476,14 @@ static void no_kind_leaves_its_bounds(void **state) {
 int main(void) {
     const struct CMUnitTest tests[] = {cmocka_unit_test(coarse_replay_of_the_base_is_the_fine_one),
                                        cmocka_unit_test(coarse_replay_tells_what_an_effect_changes),
+                                       cmocka_unit_test(old_poses_are_those_of_then),
                                        cmocka_unit_test(bearing_is_found_across_the_half_turn),
-        cmocka_unit_test(parameters_are_found_without_noise),
+                                       cmocka_unit_test(parameters_are_found_without_noise),
                                        cmocka_unit_test(parameters_are_found_through_noise),
                                        cmocka_unit_test(duties_count_when_they_act_whatever_is_wrong),
                                        cmocka_unit_test(covariance_is_the_right_size),
                                        cmocka_unit_test(structure_of_noise_is_about_none),
+                                       cmocka_unit_test(error_that_alternates_is_not_taken_for_noise),
                                        cmocka_unit_test(known_signal_raises_the_structure_by_its_square),
                                        cmocka_unit_test(fit_ends_at_a_bound_where_truth_lies_beyond),
                                        cmocka_unit_test(no_kind_leaves_its_bounds)};

@@ -37,6 +37,21 @@ static void two_effects_are_both_named(void **state) {
     diagnosed_close(&diagnosed);
 }
 
+/* A sensor's geometry has no other form than its own: the little that it leaves is another effect's. */
+static void small_effect_beside_a_sensors_geometry_is_named(void **state) {
+    static const char *const beside[] = {"valve_dead_time:delay=0.003", "line_volume:volume=2e-6"};
+    static const char *const name[] = {"valve_dead_time", "line_volume"};
+    (void)state;
+    for (size_t i = 0; i < 2; i++) {
+        diagnose("tip_lever_arm:x=-0.0008,y=0.0013,z=0.0008", beside[i], NULL);
+        assert_verdict(diagnosis, GAP_EFFECTS);
+        assert_int_equal(diagnosis->effects, 2);
+        assert_non_null(diagnosed_effect(diagnosis, "tip_lever_arm"));
+        assert_non_null(diagnosed_effect(diagnosis, name[i]));
+        diagnosed_close(&diagnosed);
+    }
+}
+
 /* What is not to be tried is found nowhere: neither among what is tried nor in what is said. */
 static void effect_that_is_left_out_is_not_named(void **state) {
     static const char *const names[] = {"creep", "mullins"};
@@ -240,7 +255,8 @@ static void stop_ends_the_search_soon(void **state) {
 
 int main(void) {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(two_effects_are_both_named),           cmocka_unit_test(effect_that_is_left_out_is_not_named),
+        cmocka_unit_test(two_effects_are_both_named),
+                                       cmocka_unit_test(small_effect_beside_a_sensors_geometry_is_named),           cmocka_unit_test(effect_that_is_left_out_is_not_named),
         cmocka_unit_test(name_beside_one_that_was_not_tried_is_half_sure),
         cmocka_unit_test(repeats_from_mid_run_have_their_onset_and_share),
         cmocka_unit_test(effect_from_mid_run_has_its_onset),

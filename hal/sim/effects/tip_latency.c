@@ -100,6 +100,10 @@ static void delay(double *state, const double *parameter, struct effect_signals 
     }
 }
 
+static double age_s(const double *parameter) {
+    return parameter[DELAY];
+}
+
 static const struct effect_kind tip_latency = {
     .name = "tip_latency",
     .what = "the tip sensor's poses are older than their times say",
@@ -108,10 +112,10 @@ static const struct effect_kind tip_latency = {
                  "which has a tail",
     .stage = EFFECT_STAGE_TIP_SENSOR,
     .scope = EFFECT_GLOBAL,
-    .by_sample = true,
     .delays = true,
     .parameter_count = 1,
     .parameter = {[DELAY] = {"delay", "s", 0.0, DELAY_MOST_S, 0.03, 0.0}},
+    .age_s = age_s,
     .pose = delay};
 
 EFFECT_REGISTER(tip_latency);
