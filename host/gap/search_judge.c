@@ -132,7 +132,7 @@ static bool completes_in(const struct search *search, const struct fit *before, 
     const double polish = is_exact(&before->model) ? EXACT_SHARE : POLISH_SHARE;
     const double share = left / fmax(fit_structure_of(&search->recalibrated.sums, 1, group), left);
     const bool halves = then < (1.0 - COMPLETING_SHARE) * left;
-    const bool most = then < (1.0 - COMPLETING_SHARE) * share / polish * left;
+    const bool most = then < (1.0 - COMPLETING_SHARE) * fmin(share / polish, 1.0) * left;
     const bool whole = left > 3.0 * STRUCTURE_LEAST && then < fmax(unexplained * left, STRUCTURE_LEAST);
     const bool trace = left > TRACE_SIGNAL * STRUCTURE_LEAST && then < (1.0 - TRACE_SHARE) * left;
     const double form = form_share(before, group);

@@ -1,0 +1,120 @@
+/* What earns a further effect its place: fits are made up, by what each leaves of the pressures and of the tip. */
+#include "support/test.h"
+
+#include "gap/search_parts.h"
+
+#define COUNT 4000.0 /* residuals of each group that were held out */
+#define NOISE 0.6    /* their mean square where nothing is left */
+
+static struct search search;
+
+/* A model of up to two effects that leaves so much structure in the pressures and at the tip. */
+static struct fit leaving(double pressures, double tip, const char *first, const char *second) {
+    struct fit fit = {.model = {.stiffness_scale = 1.0, .supply_scale = 1.0}, .sound = true};
+    const double left[FIT_GROUPS] = {pressures, tip};
+    const char *const text[] = {first, second};
+    for (size_t e = 0; e < 2 && text[e] != NULL; e++) {
+        struct effect effect;
+        char error[256];
+        if (!effect_parse(text[e], &effect, error, sizeof error)) {
+            fail_msg("%s", error);
+        }
+        gap_model_add(&fit.model, &effect);
+    }
+    for (size_t g = 0; g < FIT_GROUPS; g++) {
+        fit.sums.part[1][g] = (struct fit_part){COUNT * (left[g] + NOISE), COUNT, COUNT * NOISE, COUNT};
+    }
+    return fit;
+}
+
+static bool earns(const struct fit *before, const struct fit *after) {
+    return search_earns_place(&search, before, after);
+}
+
+static void first_effect_explains_a_share_of_the_gap(void **state) {
+    const struct fit none = leaving(50.0, 800.0, NULL, NULL);
+    const struct fit most = leaving(1.0, 10.0, "creep", NULL), hardly = leaving(50.0, 790.0, "creep", NULL);
+    (void)state;
+    search.recalibrated = none;
+    assert_true(earns(&none, &most));
+    assert_false(earns(&none, &hardly));
+}
+
+/* The smaller the rest, the more of it must be explained. */
+static void small_rest_may_be_the_form(void **state) {
+    static const double rest[] = {40.0, 10.0, 2.0};        /* of 1000: 4, 1 and 0.2 % */
+    static const double enough[] = {0.45, 0.15, 0.04};     /* of it, left */
+    static const double too_much[] = {0.55, 0.25, 0.12};
+    (void)state;
+    search.recalibrated = leaving(0.0, 1000.0, NULL, NULL);
+    for (size_t i = 0; i < 3; i++) {
+        const struct fit before = leaving(0.0, rest[i], "gravity", NULL);
+        const struct fit enough_of_it = leaving(0.0, enough[i] * rest[i], "gravity", "tip_lever_arm");
+        const struct fit too_little = leaving(0.0, too_much[i] * rest[i], "gravity", "tip_lever_arm");
+        assert_true(earns(&before, &enough_of_it));
+        assert_false(earns(&before, &too_little));
+    }
+}
+
+/* What a bent field does in one form another law of the body does, too. */
+static void one_form_of_a_bent_field_is_no_simple_effect(void **state) {
+    const struct fit before = leaving(0.0, 5.0, "gravity", NULL);
+    const struct fit bent = leaving(0.0, 0.1, "gravity", "tip_distortion:form=6");
+    const struct fit offset = leaving(0.0, 0.1, "gravity", "tip_offset");
+    (void)state;
+    search.recalibrated = leaving(0.0, 1000.0, NULL, NULL);
+    assert_false(earns(&before, &bent));
+    assert_true(earns(&before, &offset));
+}
+
+/* A misalignment is a part of a bent field, and yet a field beside it is something new. */
+static void what_makes_an_effect_its_part_is_not_more_of_the_same(void **state) {
+    const struct fit before = leaving(0.0, 0.5, "tip_misalignment", NULL);
+    const struct fit bent = leaving(0.0, 0.3, "tip_misalignment", "tip_distortion:form=1");
+    (void)state;
+    search.recalibrated = leaving(0.0, 1000.0, NULL, NULL);
+    assert_true(search_is_better(&before, &bent));
+    assert_false(earns(&before, &bent));
+}
+
+/* After geometry, scale and timing of sensors, however little is left is another effect's; after a law of the body it is not. */
+static void rest_of_exact_effects_is_not_their_form(void **state) {
+    (void)state;
+    search.recalibrated = leaving(0.5, 3000.0, NULL, NULL);
+    for (int exact = 0; exact < 2; exact++) {
+        const char *const first = exact == 1 ? "tip_lever_arm" : "end_restraint";
+        const struct fit before = leaving(0.06, 0.6, first, NULL);
+        const struct fit with = leaving(0.0, 0.25, first, "line_volume"), polish = leaving(0.05, 0.5, first, "line_volume");
+        assert_int_equal(earns(&before, &with), exact);
+        assert_false(earns(&before, &polish));
+    }
+    search.recalibrated = leaving(0.0, 3000.0, NULL, NULL);
+    const struct fit before = leaving(0.0, 4.0, "tip_offset", NULL);
+    const struct fit half = leaving(0.0, 1.8, "tip_offset", "tip_misalignment"); /* so much is no more the rest of all */
+    assert_false(earns(&before, &half));
+}
+
+static void what_another_explains_better_gives_no_place(void **state) {
+    const struct fit before = leaving(0.4, 17.0, "temperature_stiffness", NULL);
+    const struct fit line = leaving(0.19, 15.0, "temperature_stiffness", "line_resistance");
+    const struct fit creep = leaving(0.0, 7.0, "temperature_stiffness", "creep");
+    const struct fit bent = leaving(0.0, 7.0, "temperature_stiffness", "tip_distortion:form=1");
+    struct fit worse = leaving(0.0, 16.0, "temperature_stiffness", "creep");
+    (void)state;
+    search.recalibrated = leaving(1.6, 1300.0, NULL, NULL);
+    assert_true(earns(&before, &line)); /* by itself */
+    assert_true(search_is_forestalled(&search, &before, &line, &creep));
+    assert_true(search_is_forestalled(&search, &before, &line, &bent));
+    assert_false(search_is_forestalled(&search, &before, &line, &worse));
+    assert_false(search_is_forestalled(&search, &before, &creep, &line));
+}
+
+int main(void) {
+    const struct CMUnitTest tests[] = {cmocka_unit_test(first_effect_explains_a_share_of_the_gap),
+                                       cmocka_unit_test(small_rest_may_be_the_form),
+                                       cmocka_unit_test(one_form_of_a_bent_field_is_no_simple_effect),
+                                       cmocka_unit_test(what_makes_an_effect_its_part_is_not_more_of_the_same),
+                                       cmocka_unit_test(rest_of_exact_effects_is_not_their_form),
+                                       cmocka_unit_test(what_another_explains_better_gives_no_place)};
+    return cmocka_run_group_tests(tests, NULL, NULL);
+}
