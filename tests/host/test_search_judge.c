@@ -99,13 +99,13 @@ static void what_another_explains_better_gives_no_place(void **state) {
     const struct fit line = leaving(0.19, 15.0, "temperature_stiffness", "line_resistance");
     const struct fit creep = leaving(0.0, 7.0, "temperature_stiffness", "creep");
     const struct fit bent = leaving(0.0, 7.0, "temperature_stiffness", "tip_distortion:form=1");
-    struct fit worse = leaving(0.0, 16.0, "temperature_stiffness", "creep");
+    const struct fit elsewhere = leaving(0.15, 7.0, "temperature_stiffness", "creep"); /* of the tip, mostly */
     (void)state;
     search.recalibrated = leaving(1.6, 1300.0, NULL, NULL);
     assert_true(earns(&before, &line)); /* by itself */
     assert_true(search_is_forestalled(&search, &before, &line, &creep));
     assert_true(search_is_forestalled(&search, &before, &line, &bent));
-    assert_false(search_is_forestalled(&search, &before, &line, &worse));
+    assert_false(search_is_forestalled(&search, &before, &line, &elsewhere));
     assert_false(search_is_forestalled(&search, &before, &creep, &line));
 }
 
