@@ -64,6 +64,7 @@ struct effect_signals {
                                           * pose hooks may look, after all the load hooks */
     struct body_shape *shape;            /* shape hook */
     struct tip_pose *pose;               /* pose hook */
+    bool aged;                           /* pose hook: the pose is of then already, see age_s below */
     bool repeats;                        /* pose hook: to be set where the sensor gives its last sample again, noise and all */
 };
 
@@ -82,8 +83,8 @@ struct effect_kind {
     bool delays;    /* what it does is to be late: in one loop it looks like whatever else is */
     bool by_chance; /* parameter 0 is the probability that it acts at a tip sample (signals->chance below it) */
     bool by_threshold; /* nothing happens on one side of parameter 0: a fit must start on the right one */
-    /* By how much the tip sensor's poses are older than their times say. A replay, which knows all pressures, takes the pose
-     * of then; the pose hook is for what has but its own past. */
+    /* By how much the tip sensor's poses are older than their times say. Where all pressures are known (the plant's own, a
+     * replay's) the pose is taken at those of then; the pose hook is for what knows no pressures between samples. */
     double (*age_s)(const double *parameter);
     size_t parameter_count;
     struct effect_parameter parameter[EFFECT_PARAMETERS_MAX];

@@ -77,6 +77,7 @@ bool plant_add_effect(struct plant *plant, const struct effect *effect) {
         return false;
     }
     plant->effect[plant->effect_count++] = *effect;
+    plant->ages_tip = plant->ages_tip || effect->kind->age_s != NULL;
     return true;
 }
 
@@ -103,6 +104,51 @@ void plant_start_period(struct plant *plant, int64_t time_us, const double duty[
     }
 }
 
+/* --- old poses --- */
+
+/* The newest entry gives way to the next while it is too near the one before. */
+static void remember(struct plant *plant, double time_s) {
+    struct plant_past *past = &plant->past;
+    const size_t before = (past->newest + PLANT_PAST - 1) % PLANT_PAST;
+    if (past->count < 2 || past->time_s[past->newest] - past->time_s[before] >= PLANT_PAST_SPACING_S) {
+        past->newest = past->count > 0 ? (past->newest + 1) % PLANT_PAST : 0;
+        past->count += past->count < PLANT_PAST;
+    }
+    past->time_s[past->newest] = time_s;
+    memcpy(past->pressure_pa[past->newest], plant->pressure_pa, sizeof plant->pressure_pa);
+}
+
+/* From before it began: as it then was. */
+static void recall(const struct plant *plant, double time_s, double pressure_pa[3]) {
+    const struct plant_past *past = &plant->past;
+    size_t after = past->newest, at = past->newest;
+    for (size_t back = 1; back < past->count && past->time_s[at] > time_s; back++) {
+        after = at;
+        at = (at + PLANT_PAST - 1) % PLANT_PAST;
+    }
+    const double length_s = past->time_s[after] - past->time_s[at];
+    const double share = length_s > 0.0 ? fmin(fmax((time_s - past->time_s[at]) / length_s, 0.0), 1.0) : 0.0;
+    for (size_t c = 0; c < 3; c++) {
+        pressure_pa[c] = past->pressure_pa[at][c] + share * (past->pressure_pa[after][c] - past->pressure_pa[at][c]);
+    }
+}
+
+static void recall_or_now(const struct plant *plant, double time_s, double age_s, double pressure_pa[3]) {
+    memcpy(pressure_pa, plant->pressure_pa, sizeof plant->pressure_pa);
+    if (age_s > 0.0) {
+        recall(plant, time_s - age_s, pressure_pa);
+    }
+}
+
+static double age_at(const struct plant *plant, double time_s) {
+    double age_s = 0.0;
+    for (size_t e = 0; e < plant->effect_count; e++) {
+        const struct effect *effect = &plant->effect[e];
+        age_s += effect->kind->age_s != NULL && time_s >= effect->onset_s ? effect->kind->age_s(effect->parameter) : 0.0;
+    }
+    return age_s;
+}
+
 void plant_step(struct plant *plant, bool supply_open, int64_t from_us, int64_t to_us) {
     struct effect_signals signals = signals_at(plant, 1e-6 * (double)from_us, 1e-6 * (double)(to_us - from_us));
     reset_influence(plant);
@@ -117,6 +163,9 @@ void plant_step(struct plant *plant, bool supply_open, int64_t from_us, int64_t 
             plant->pressure_pa[c] += plant->influence.coupling[c][d] * plant->chambers.pressure_pa[d];
         }
     }
+    if (plant->ages_tip) {
+        remember(plant, 1e-6 * (double)to_us);
+    }
     memcpy(plant->reading_pa, plant->pressure_pa, sizeof plant->reading_pa);
     signals = signals_at(plant, 1e-6 * (double)to_us, 1e-6 * (double)(to_us - from_us));
     signals.reading_pa = plant->reading_pa;
@@ -125,9 +174,15 @@ void plant_step(struct plant *plant, bool supply_open, int64_t from_us, int64_t 
 
 void plant_sample_tip(struct plant *plant, const double *pressure_pa, double time_s, double step_s, double chance) {
     const double scale = plant->parameters.gas.stiffness_scale;
-    const double *pressure = pressure_pa != NULL ? pressure_pa : plant->pressure_pa;
+    /* beyond the snap its own past is not told by pressures: there the pose hook has to do */
+    const bool aged = pressure_pa == NULL && plant->past.count > 0 && plant->chambers.ballooned == CHAMBERS_NONE;
+    const double age_s = aged ? age_at(plant, time_s) : 0.0;
+    double past_pa[3];
+    recall_or_now(plant, time_s, age_s, past_pa);
+    const double *pressure = pressure_pa != NULL ? pressure_pa : past_pa;
     double load_pa[3] = {pressure[0] / scale, pressure[1] / scale, pressure[2] / scale};
-    struct effect_signals signals = signals_at(plant, time_s, step_s);
+    struct effect_signals signals = signals_at(plant, fmax(time_s - age_s, fmin(time_s, 0.0)), step_s);
+    signals.aged = aged;
     signals.chance = chance;
     signals.pressure_pa = pressure;
     signals.load_pa = load_pa;

@@ -29,12 +29,24 @@ struct plant_parameters {
     double supply_relief_pa; /* of one on the supply; 0: none */
 };
 
+/* What the pressures were, for a tip sensor whose poses are old. */
+#define PLANT_PAST 256
+#define PLANT_PAST_SPACING_S 6e-4 /* at least, so that it reaches back 0.15 s */
+struct plant_past {
+    size_t count;
+    size_t newest;
+    double time_s[PLANT_PAST];
+    double pressure_pa[PLANT_PAST][3];
+};
+
 struct plant {
     const struct bend_table *table;
     struct plant_parameters parameters;
     struct plant_faults faults;
     struct effect effect[PLANT_EFFECTS_MAX];
     size_t effect_count;
+    bool ages_tip;          /* an effect of it makes poses old: */
+    struct plant_past past; /* filled only then */
     struct valve valve[3];
     struct chambers chambers;
     struct chamber_influence influence; /* of the last step */
@@ -56,7 +68,8 @@ bool plant_add_effect(struct plant *plant, const struct effect *effect);
 void plant_start_period(struct plant *plant, int64_t time_us, const double duty[3]);
 /* Gas from `from_us` to `to_us`, at most a millisecond or so; then the sensors' readings. */
 void plant_step(struct plant *plant, bool supply_open, int64_t from_us, int64_t to_us);
-/* Shape and pose at `pressure_pa` (NULL: at the chambers' own), `step_s` after the last sample. */
+/* Shape and pose at `pressure_pa` (NULL: at the chambers' own, of as long ago as an effect says that the tip sensor's poses are
+ * old), `step_s` after the last sample. */
 void plant_sample_tip(struct plant *plant, const double *pressure_pa, double time_s, double step_s, double chance);
 
 #endif

@@ -118,8 +118,8 @@ static double belief_by_pressures(const struct search *search, const struct diag
         for (size_t i = 0; i < rivals->count; i++) {
             least = fmin(least, pressure_squares(&rivals->rival[i].fit));
         }
-        const struct fit_part *part = &search->best.sums.part[1][FIT_PRESSURE];
-        const double noise = part->noise_count > 0.0 ? part->noise / part->noise_count : 1.0;
+        const bool seen = search->best.sums.part[1][FIT_PRESSURE].noise_count > 0.0;
+        const double noise = seen ? fit_noise_of(&search->best.sums, 1, FIT_PRESSURE) : 1.0;
         const double scale =
             PRESSURE_SHARE * fmax(pressure_squares(&search->recalibrated) - least, 0.0) + 4.0 * noise;
         for (size_t i = 0; i < rivals->count; i++) {

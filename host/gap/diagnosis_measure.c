@@ -15,9 +15,8 @@
 struct chunks {
     size_t count;
     double *square;   /* sum of squares */
-    double *noise;    /* sum of squares of half differences of neighbours: noise alone */
     double *residual; /* how many */
-    double *apart;    /* how many of them have a neighbour whose difference is no noise */
+    struct fit_part all[FIT_GROUPS]; /* of all chunks; only its noise and counts are used */
 };
 
 struct model_view {
@@ -29,19 +28,14 @@ static bool view_open(struct model_view *view, size_t residuals, size_t chunks) 
     view->residual = calloc(residuals + 1, sizeof(double));
     view->chunks.count = chunks;
     view->chunks.square = calloc(chunks + 1, sizeof(double));
-    view->chunks.noise = calloc(chunks + 1, sizeof(double));
     view->chunks.residual = calloc(chunks + 1, sizeof(double));
-    view->chunks.apart = calloc(chunks + 1, sizeof(double));
-    return view->residual != NULL && view->chunks.square != NULL && view->chunks.noise != NULL &&
-           view->chunks.residual != NULL && view->chunks.apart != NULL;
+    return view->residual != NULL && view->chunks.square != NULL && view->chunks.residual != NULL;
 }
 
 static void view_close(struct model_view *view) {
     free(view->residual);
     free(view->chunks.square);
-    free(view->chunks.noise);
     free(view->chunks.residual);
-    free(view->chunks.apart);
 }
 
 struct series {
@@ -50,6 +44,7 @@ struct series {
     size_t count;
     double block_s;
     size_t first_chunk;
+    enum fit_group group;
 };
 
 /* The series of a run: three pressures, one supply, six tip channels. */
@@ -59,12 +54,13 @@ static size_t list_series(const struct replay *replay, size_t index, size_t firs
     size_t count = 0;
     for (size_t c = 0; c < 3; c++) {
         series[count++] =
-            (struct series){run->pressure_at + c, 3, run->blocks, REPLAY_PRESSURE_BLOCK_S, first_chunk};
+            (struct series){run->pressure_at + c, 3, run->blocks, REPLAY_PRESSURE_BLOCK_S, first_chunk, FIT_PRESSURE};
     }
-    series[count++] = (struct series){run->supply_at, 1, run->blocks, REPLAY_PRESSURE_BLOCK_S, first_chunk};
+    series[count++] =
+        (struct series){run->supply_at, 1, run->blocks, REPLAY_PRESSURE_BLOCK_S, first_chunk, FIT_PRESSURE};
     for (size_t k = 0; k < REPLAY_TIP_CHANNELS; k++) {
         series[count++] = (struct series){run->tip_at + k, REPLAY_TIP_CHANNELS, run->tip_blocks,
-                                          REPLAY_TIP_BLOCK_S, first_chunk};
+                                          REPLAY_TIP_BLOCK_S, first_chunk, FIT_TIP};
     }
     return count;
 }
@@ -86,9 +82,12 @@ static void count_series(const struct replay *replay, const struct series *serie
         view->chunks.residual[chunk] += 1.0;
         const bool follows = b > 0 && !replay->apart[at] && replay->held_out[at - series->stride] &&
                              replay->weight[at - series->stride] > 0.0;
-        view->chunks.apart[chunk] += replay->apart[at];
+        struct fit_part *all = &view->chunks.all[series->group];
         const double step = follows ? now - view->residual[at - series->stride] : now;
-        view->chunks.noise[chunk] += follows ? 0.5 * step * step + replay->lasting[at] : 0.0;
+        all->noise += follows ? 0.5 * step * step + replay->lasting[at] : 0.0;
+        all->noise_count += follows;
+        all->count += 1.0;
+        all->noise_most = replay->noise_most[series->group];
     }
 }
 
@@ -121,11 +120,12 @@ static double mean_square(const struct chunks *chunks, const double *sum, const 
 /* What noise alone makes of a mean square. */
 static double noise_square(const struct chunks *chunks) {
     double total = 0.0, count = 0.0;
-    for (size_t i = 0; i < chunks->count; i++) {
-        total += chunks->noise[i];
-        count += chunks->residual[i] - chunks->apart[i];
+    for (int group = 0; group < FIT_GROUPS; group++) {
+        const struct fit_part *all = &chunks->all[group];
+        total += all->noise_count > 0.0 ? fmin(all->noise / all->noise_count, all->noise_most) * all->count : 0.0;
+        count += all->count;
     }
-    return count > 0.0 ? fmin(total / count, FIT_NOISE_MOST) : 0.0;
+    return count > 0.0 ? total / count : 0.0;
 }
 
 static double share_closed(const struct chunks *before, const struct chunks *after, double floor2,
@@ -254,7 +254,7 @@ static bool take_rms(struct diagnosis *diagnosis, const struct replay *replay, c
 
 /* Floor: what noise alone leaves of neighbouring blocks' differences. */
 static void physical_floor(const struct replay *replay, const double *residual, double floor_of[3]) {
-    double sum[3] = {0.0, 0.0, 0.0}, count[3] = {0.0, 0.0, 0.0};
+    double sum[3] = {0.0, 0.0, 0.0}, whitened[3] = {0.0, 0.0, 0.0}, count[3] = {0.0, 0.0, 0.0};
     static const double unit[3] = {1e-3, 1e3, DEGREES};
     for (size_t i = 0; i < replay->runs; i++) {
         struct series series[10];
@@ -269,13 +269,15 @@ static void physical_floor(const struct replay *replay, const double *residual, 
                         unit[kind];
                     const double lasting = sqrt(replay->lasting[at]) / replay->weight[at] * unit[kind];
                     sum[kind] += 0.5 * step * step + lasting * lasting;
+                    whitened[kind] += 0.5 * pow(residual[at] - residual[last], 2.0) + replay->lasting[at];
                     count[kind] += 1.0;
                 }
             }
         }
     }
     for (size_t kind = 0; kind < 3; kind++) {
-        floor_of[kind] = count[kind] > 0.0 ? sqrt(sum[kind] / count[kind]) : NAN;
+        const double most = replay->noise_most[kind == 0 ? FIT_PRESSURE : FIT_TIP], mean = whitened[kind] / count[kind];
+        floor_of[kind] = count[kind] > 0.0 ? sqrt(sum[kind] / count[kind] * fmin(most / mean, 1.0)) : NAN;
     }
 }
 
@@ -308,7 +310,7 @@ static struct series_structure structure_of(const struct replay *replay, const s
     }
     struct series_structure out = {0.0, 0.0};
     if (count > 0.0 && pairs > 0.0 && lagged > 0.0) {
-        out.structure = fmax(square / count - step2 / pairs, 0.0);
+        out.structure = fmax(square / count - fmin(step2 / pairs, replay->noise_most[series->group]), 0.0);
         out.remembered = square > 0.0 ? product / lagged / (square / count) : 0.0;
     }
     return out;

@@ -12,6 +12,7 @@
 #define ATTEMPTS 5
 #define REBASES 4
 #define MOVED_LITTLE 1e-3         /* of the nominal scales: a base tells of that exactly enough */
+#define AGED_LITTLE_S 2e-4        /* .. and so long is nothing beside a valve's pulse, by which it errs */
 #define ENOUGH 2e-4              /* relative change of the sum of squares that is worth no further step */
 
 static bool acts_on_gas(const struct effect_kind *kind) {
@@ -213,7 +214,7 @@ static void take_residuals(const struct fitter *fitter, const struct gap_model *
                            double *residual) {
     replay_take_pressures(fitter->replay, state, residual);
     replay_tip(fitter->replay, model, state, false, residual);
-    const double *offset = fitter->base->offset[replay_needs_samples(model) ? 0 : 1];
+    const double *offset = fitter->base->offset[replay_needs_samples(fitter->replay, model) ? 0 : 1];
     for (size_t k = 0; offset != NULL && k < fitter->replay->residuals; k++) {
         residual[k] += offset[k];
     }
@@ -247,6 +248,9 @@ static bool counts(const struct fitter *fitter, size_t k) {
 static void sum_up(const struct fitter *fitter, const double *residual, struct fit_sums *sums) {
     const struct replay *replay = fitter->replay;
     memset(sums, 0, sizeof *sums);
+    for (int k = 0; k < 2 * FIT_GROUPS; k++) {
+        sums->part[k / FIT_GROUPS][k % FIT_GROUPS].noise_most = replay->noise_most[k % FIT_GROUPS];
+    }
     for (size_t i = 0; i < replay->runs; i++) {
         const struct replay_run *run = &replay->run[i];
         const size_t end = run->tip_at + REPLAY_TIP_CHANNELS * run->tip_blocks;
@@ -281,10 +285,14 @@ double fit_mean_square(const struct fit_sums *sums, int held_out) {
     return count > 0.0 ? fit_squares(sums, held_out) / count : 0.0;
 }
 
+double fit_noise_of(const struct fit_sums *sums, int held_out, enum fit_group group) {
+    const struct fit_part *part = &sums->part[held_out][group];
+    return part->noise_count > 0.0 ? fmin(part->noise / part->noise_count, part->noise_most) : 0.0;
+}
+
 double fit_structure_of(const struct fit_sums *sums, int held_out, enum fit_group group) {
     const struct fit_part *part = &sums->part[held_out][group];
-    const double noise = part->noise_count > 0.0 ? fmin(part->noise / part->noise_count, FIT_NOISE_MOST) : 0.0;
-    return part->count > 0.0 ? fmax(part->square / part->count - noise, 0.0) : 0.0;
+    return part->count > 0.0 ? fmax(part->square / part->count - fit_noise_of(sums, held_out, group), 0.0) : 0.0;
 }
 
 double fit_structure(const struct fit_sums *sums, int held_out) {
@@ -543,7 +551,8 @@ bool fit_rebased(const struct replay *fine, const struct replay *coarse, struct 
             fitter_close(&fitter);
         }
         moved = fabs(fit->model.stiffness_scale - base.model.stiffness_scale) > MOVED_LITTLE ||
-                fabs(fit->model.supply_scale - base.model.supply_scale) > MOVED_LITTLE;
+                fabs(fit->model.supply_scale - base.model.supply_scale) > MOVED_LITTLE ||
+                fabs(gap_model_age_s(&fit->model, INFINITY) - gap_model_age_s(&base.model, INFINITY)) > AGED_LITTLE_S;
         fit_base_close(&base);
     }
     return sound;

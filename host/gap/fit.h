@@ -16,18 +16,13 @@ struct fit_base {
     struct replay_state moved[2]; /* derivatives by stiffness and supply scale */
 };
 
-/* Whitened, noise alone makes at most that of a mean square; what differs more between neighbouring blocks is an error that
- * alternates, as that of a pulse's timing does. */
-#define FIT_NOISE_MOST 1.2
-
-enum fit_group { FIT_PRESSURE, FIT_TIP, FIT_GROUPS };
-
 /* Sums over whitened residuals of one group. */
 struct fit_part {
     double square;
     double count;
     double noise; /* half the squares of differences of neighbouring blocks, and how many */
     double noise_count;
+    double noise_most; /* that these may make of a mean square, see replay.h */
 };
 
 /* [0] fitted, [1] held out. */
@@ -68,7 +63,8 @@ void fitter_close(struct fitter *fitter);
 void fitter_evaluate(struct fitter *fitter, const struct gap_model *model);
 /* At most `rounds` steps from fit->model. `fit_nominal`: stiffness and supply move too. */
 void fitter_run(struct fitter *fitter, struct fit *fit, int rounds, bool fit_nominal);
-/* The same from bases of its own, as often as the nominal parameters move so far that a base no longer tells of them. False:
+/* The same from bases of its own, as often as the nominal parameters or the tip's age move so far that a base no longer tells of
+ * them. False:
  * out of memory. */
 bool fit_rebased(const struct replay *fine, const struct replay *coarse, struct fit *fit, int rounds);
 /* By how much pressure residuals would shrink, to first order, were the effect added to the base on all chambers [0] or on
@@ -82,8 +78,9 @@ double fitter_gain(struct fitter *fitter, const struct gap_model *model, double 
 double fit_squares(const struct fit_sums *sums, int held_out);
 double fit_count(const struct fit_sums *sums, int held_out);
 double fit_mean_square(const struct fit_sums *sums, int held_out);
-/* Of one group: mean square less what noise alone makes of it (von Neumann 1941; at most FIT_NOISE_MOST), not below zero: what is
- * left to explain. */
+/* Of one group: what noise alone makes of its mean square (von Neumann 1941), at most noise_most. */
+double fit_noise_of(const struct fit_sums *sums, int held_out, enum fit_group group);
+/* .. and its mean square less that, not below zero: what is left to explain. */
 double fit_structure_of(const struct fit_sums *sums, int held_out, enum fit_group group);
 /* The same of both, by their counts. */
 double fit_structure(const struct fit_sums *sums, int held_out);

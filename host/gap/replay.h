@@ -50,6 +50,9 @@ struct replay_elsewhere {
     double moves_m;         /* .. while the other's moves by so much about its mean */
 };
 
+/* Residuals are judged apart by what was measured: pressures with the supply, and the tip. */
+enum fit_group { FIT_PRESSURE, FIT_TIP, FIT_GROUPS };
+
 struct replay {
     const struct gap_data *data;
     const struct bend_table *table;
@@ -61,6 +64,9 @@ struct replay {
     bool coarse;       /* longer steps, and of each tip block one sample: see replay_open_coarse() */
     bool rigid;        /* pressures are as the duties make them, but for a constant: the tip then tells of them finest */
     double *weight;    /* [residuals] 1 / (noise of a block) */
+    /* What noise may at most make of a mean square by neighbours' differences: twice what it makes where nothing pulses, by their
+     * median. What differs by more is an error that alternates, as that of a pulse's timing does. */
+    double noise_most[FIT_GROUPS];
     uint8_t *held_out; /* [residuals] 1: not used to fit */
     struct replay_elsewhere elsewhere;
     double *lasting;   /* [residuals] share of a block's noise that its neighbours have too; see noise_floor.h */
@@ -97,7 +103,7 @@ void replay_correct(const struct replay *replay, struct replay_state *state);
 void replay_tip(const struct replay *replay, const struct gap_model *model, const struct replay_state *state,
                 bool from_duties, double *residual);
 /* Does the model ask for every tip sample, in a coarse replay too? */
-bool replay_needs_samples(const struct gap_model *model);
+bool replay_needs_samples(const struct replay *replay, const struct gap_model *model);
 /* Pressure and supply residuals of the state into `residual`. */
 void replay_take_pressures(const struct replay *replay, const struct replay_state *state, double *residual);
 /* Once, on the nominal model: when the logged duties count, then as replay_tune(). */

@@ -159,6 +159,7 @@ bool replay_open_coarse(struct replay *coarse, const struct replay *fine) {
 void replay_follow(struct replay *coarse, const struct replay *fine) {
     coarse->rigid = fine->rigid;
     coarse->elsewhere = fine->elsewhere;
+    memcpy(coarse->noise_most, fine->noise_most, sizeof fine->noise_most);
     memcpy(coarse->weight, fine->weight, fine->residuals * sizeof *fine->weight);
     memcpy(coarse->lasting, fine->lasting, fine->residuals * sizeof *fine->lasting);
     for (size_t i = 0; i < fine->runs; i++) {

@@ -36,23 +36,15 @@ static void pressures_at(const struct replay *replay, const struct replay_state 
     }
 }
 
-bool replay_needs_samples(const struct gap_model *model) {
+bool replay_needs_samples(const struct replay *replay, const struct gap_model *model) {
     for (size_t e = 0; e < model->count; e++) {
-        if (model->effect[e].kind->by_chance) {
+        const struct effect_kind *kind = model->effect[e].kind;
+        /* old poses of another simulator are found between its samples */
+        if (kind->by_chance || (kind->age_s != NULL && replay->data->from_simulator)) {
             return true;
         }
     }
     return false;
-}
-
-/* How old the sensor's poses are at a time. */
-static double age_at(const struct gap_model *model, double time_s) {
-    double age_s = 0.0;
-    for (size_t e = 0; e < model->count; e++) {
-        const struct effect *effect = &model->effect[e];
-        age_s += effect->kind->age_s != NULL && time_s >= effect->onset_s ? effect->kind->age_s(effect->parameter) : 0.0;
-    }
-    return age_s;
 }
 
 /* The model without what only makes poses old. */
@@ -77,7 +69,7 @@ void replay_tip_of_run(const struct replay *replay, const struct gap_model *mode
     double sum[REPLAY_TIP_CHANNELS] = {0.0}, before_s = 1e-6 * (double)run->start_us;
     const bool sampled =
         data->sim_tip != NULL && data->sim_pa == NULL; /* what the sensors show is told at each sample */
-    const bool picked = replay->coarse && !replay_needs_samples(model) && !sampled;
+    const bool picked = replay->coarse && !replay_needs_samples(replay, model) && !sampled;
     /* another simulator's poses are known at its samples only */
     const struct gap_model prompt = data->sim_tip != NULL ? *model : without_age(model);
     replay_set_up_plant(replay, &prompt, &plant);
@@ -95,7 +87,9 @@ void replay_tip_of_run(const struct replay *replay, const struct gap_model *mode
             row++;
         }
         plant.temperature_k = replay_temperature_at(data, row);
-        const double time_s = tip->time_s - (data->sim_tip != NULL ? 0.0 : age_at(model, tip->time_s));
+        /* not before it began: there nothing acts */
+        const double age_s = data->sim_tip != NULL ? 0.0 : gap_model_age_s(model, tip->time_s);
+        const double time_s = fmax(tip->time_s - age_s, fmin(tip->time_s, 1e-6 * (double)run->start_us));
         pressures_at(replay, state, index, time_s, from_duties, nudge_pa, nudged, pressure_pa);
         const double step_s = fmax(time_s - before_s, 1e-6), chance = tip->repeated ? 0.0 : 1.0;
         if (data->sim_tip != NULL) {

@@ -11,6 +11,9 @@
 #define POSITION_FLOOR_M 1.5e-5
 #define ANGLE_FLOOR_RAD (0.015 * M_PI / 180.0)
 #define NUDGE_PA 20.0
+#define NOISE_MOST_LEAST 1.2  /* of a mean square: weights say one, and a bit for chance */
+#define HEAVY_TAILS 2.0       /* mean square over what the median of a Gaussian's would say */
+#define MEDIAN_OF_SQUARE 0.4549 /* of a standard normal's */
 #define TIMING_SHARE 0.998 /* of the jumps under the format's own timing: another must leave fewer */
 
 /* How freely a pressure wanders is seen within stretches: the jumps between them are taken off. */
@@ -163,6 +166,47 @@ static void choose_duty_timing(struct replay *replay, const struct gap_model *mo
     }
 }
 
+static int by_size(const void *a, const void *b) {
+    const double x = *(const double *)a, y = *(const double *)b;
+    return (x > y) - (x < y);
+}
+
+/* Half the squared differences of neighbouring blocks of one group, into `half_square`; returns how many. */
+static size_t list_differences(const struct replay *replay, const double *residual, enum fit_group group, double *half_square) {
+    size_t count = 0;
+    for (size_t i = 0; i < replay->runs; i++) {
+        const struct replay_run *run = &replay->run[i];
+        const bool tip = group == FIT_TIP; /* of the pressures, the supply would tell nothing new */
+        const size_t stride = tip ? REPLAY_TIP_CHANNELS : 3, start = tip ? run->tip_at : run->pressure_at;
+        const size_t end = start + stride * (tip ? run->tip_blocks : run->blocks);
+        for (size_t k = start + stride; k < end; k++) {
+            if (replay->weight[k] > 0.0 && replay->weight[k - stride] > 0.0 && !replay->apart[k]) {
+                const double step = residual[k] - residual[k - stride];
+                half_square[count++] = 0.5 * step * step + replay->lasting[k];
+            }
+        }
+    }
+    return count;
+}
+
+static bool find_noise_most(struct replay *replay, const struct gap_model *model, const struct replay_state *state) {
+    double *residual = calloc(2 * replay->residuals + 1, sizeof *residual);
+    if (residual == NULL) {
+        return false;
+    }
+    replay_take_pressures(replay, state, residual);
+    replay_tip(replay, model, state, false, residual);
+    for (int group = 0; group < FIT_GROUPS; group++) {
+        double *half_square = residual + replay->residuals;
+        const size_t count = list_differences(replay, residual, (enum fit_group)group, half_square);
+        qsort(half_square, count, sizeof half_square[0], by_size);
+        const double quiet = count > 0 ? half_square[count / 2] / MEDIAN_OF_SQUARE : 0.0;
+        replay->noise_most[group] = fmax(HEAVY_TAILS * quiet, NOISE_MOST_LEAST);
+    }
+    free(residual);
+    return true;
+}
+
 bool replay_prepare(struct replay *replay, const struct gap_model *model, struct replay_state *state) {
     for (size_t i = 0; i < replay->runs; i++) {
         weigh_pressures(replay, i);
@@ -199,5 +243,5 @@ bool replay_tune(struct replay *replay, const struct gap_model *model, struct re
             return false;
         }
     }
-    return true;
+    return find_noise_most(replay, model, state);
 }

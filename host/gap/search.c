@@ -9,8 +9,8 @@
 #define DISBELIEVED 0.1 /* an effect that its rivals leave so little belief gives way to the best of them, .. */
 #define BELIEVED 0.65   /* .. or to one that would be the verdict */
 #define DOUBTED 0.65    /* a further effect that its rivals leave less is left out, if the others .. */
-#define HOPELESS_SHARE 0.5 /* of the gap: where two effects leave more, a third does not explain it */
 #define EXPLAINED_SHARE 0.03 /* .. leave no more than that of the gap by themselves */
+#define HOPELESS_SHARE 0.5 /* of the gap: where two effects leave more, a third does not explain it */
 
 static bool prepare(struct search *search) {
     struct replay_state state;
@@ -194,6 +194,16 @@ static bool settle_with_rivals(struct search *search, struct search_workspace *r
     return sound;
 }
 
+/* Do two effects leave so much that a third does not explain it? Repeats are seen as such, and are none of the two. */
+static bool is_hopeless(const struct search *search) {
+    const double left = search_structure(&search->best) / fmax(search_structure(&search->recalibrated), STRUCTURE_LEAST);
+    size_t kinds = gap_model_kinds(&search->best.model);
+    for (size_t e = 0; e < search->best.model.count; e++) {
+        kinds -= search->best.model.effect[e].kind->by_chance;
+    }
+    return kinds > 1 && left > HOPELESS_SHARE;
+}
+
 /* --- the whole --- */
 
 bool search_run(struct search *search, const struct gap_data *data, const struct bend_table *table,
@@ -222,8 +232,7 @@ bool search_run(struct search *search, const struct gap_data *data, const struct
         if (search->best.model.count + 3 > GAP_EFFECTS_MAX) {
             break;
         }
-        const double left = search_structure(&search->best) / fmax(search_structure(&search->recalibrated), STRUCTURE_LEAST);
-        if ((step > 0 && !search_has_rest(search, &search->best)) || (step > 1 && left > HOPELESS_SHARE)) {
+        if ((step > 0 && !search_has_rest(search, &search->best)) || is_hopeless(search)) {
             break;
         }
         const bool found = search_add_one(search, room, step);

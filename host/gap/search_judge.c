@@ -5,10 +5,11 @@
 #define GAIN_SHARE 0.03      /* an effect must take off this share of the held-out squares .. */
 #define GAIN_SIGMA 40.0      /* .. and so much that noise does not */
 #define COMPLETING_SHARE 0.5 /* of what is left, that a further effect must explain */
+#define BESIDE_EXACT_SHARE 0.1 /* of the squares that exact effects leave, noise and all, that a further one must explain */
+#define FORESTALLED_SHARE 0.25 /* of what is left, that another explains more of */
 /* Shares of the gap, in pressures or at the tip: */
 #define POLISH_SHARE 0.025  /* less than that is left by any form of the right effect, .. */
 #define EXACT_SHARE 0.01    /* .. less than that by effects that have but one form, .. */
-#define BESIDE_EXACT_SHARE 0.1 /* of the squares that such effects leave, noise and all, that a further one must explain */
 #define FORM_LEAST 0.0005   /* .. less than that by most forms of it, .. */
 #define TRACE_LEAST 0.00005 /* .. and less than that by all: no effect is sought for it */
 /* Shares of the whole gap: */
@@ -17,7 +18,6 @@
 #define LAW_AT_TIP 0.2      /* of a law's doubt: what it leaves at the tip, where six coordinates hold it */
 #define WHOLE_SHARE 0.95      /* of such a small rest, that an effect must explain, .. */
 #define UNEXPLAINED_MOST 0.1  /* .. but for what its own law may leave, at most that, .. */
-#define FORESTALLED_SHARE 0.25 /* of what is left, that another explains more of */
 #define TRACE_SHARE 0.98      /* .. and of a trace, .. */
 #define TRACE_SIGNAL 10.0     /* .. which is so many times what is worth explaining at all */
 /* Of pressures that no effect acts on yet: so much is no form's doing, and an effect must explain all but that. */
@@ -132,7 +132,8 @@ static bool completes_in(const struct search *search, const struct fit *before, 
     const double polish = is_exact(&before->model) ? EXACT_SHARE : POLISH_SHARE;
     const double share = left / fmax(fit_structure_of(&search->recalibrated.sums, 1, group), left);
     const bool halves = then < (1.0 - COMPLETING_SHARE) * left;
-    const bool most = then < (1.0 - COMPLETING_SHARE) * fmin(share / polish, 1.0) * left;
+    const double of_whole = left / fmax(MATERIAL_SHARE * search_structure(&search->recalibrated), left);
+    const bool most = then < (1.0 - COMPLETING_SHARE) * fmin(share / polish, of_whole) * left;
     const bool whole = left > 3.0 * STRUCTURE_LEAST && then < fmax(unexplained * left, STRUCTURE_LEAST);
     const bool trace = left > TRACE_SIGNAL * STRUCTURE_LEAST && then < (1.0 - TRACE_SHARE) * left;
     const double form = form_share(before, group);
@@ -164,14 +165,21 @@ static bool completes(const struct search *search, const struct fit *before, con
 
 bool search_is_forestalled(const struct search *search, const struct fit *before, const struct fit *after,
                            const struct fit *other) {
-    bool any = before->model.count > 0 && search_held_out(other) < search_held_out(after);
-    for (int g = 0; g < FIT_GROUPS; g++) {
+    const struct effect_kind *kind = after->model.effect[added(before, after)].kind;
+    bool in_a_group = false, better = true;
+    if (before->model.count == 0 || parts_of(before, kind) > 0 || !(search_held_out(other) < search_held_out(after)) ||
+        parts_of(other, other->model.effect[added(before, other)].kind) != 1) {
+        return false;
+    }
+    for (int g = gap_effect_upstream(kind) ? FIT_PRESSURE : FIT_TIP; g < FIT_GROUPS; g++) {
         const enum fit_group group = (enum fit_group)g;
         const double left = fit_structure_of(&before->sums, 1, group), then = fit_structure_of(&after->sums, 1, group);
-        const bool more = then - fit_structure_of(&other->sums, 1, group) > FORESTALLED_SHARE * left;
-        any = any && (more || !completes_in(search, before, after, group));
+        const bool gives_place = completes_in(search, before, after, group);
+        in_a_group = in_a_group || gives_place;
+        better = better && (!gives_place || then - fit_structure_of(&other->sums, 1, group) > FORESTALLED_SHARE * left);
     }
-    return any && parts_of(other, other->model.effect[added(before, other)].kind) == 1;
+    const double more = search_structure(after) - search_structure(other);
+    return in_a_group ? better : more > FORESTALLED_SHARE * search_structure(before);
 }
 
 /* The same kind twice, though its forms are alternatives and do not add up. */
@@ -196,7 +204,8 @@ bool search_earns_place(const struct search *search, const struct fit *before, c
     }
     const size_t place = added(before, after);
     const bool adds = after->model.effect[place].kind->forms_add || gap_model_is_part(&after->model, place);
-    const bool known = parts_of(before, after->model.effect[place].kind) > 0;
+    /* a bent field beside what could be a part of it is new */
+    const bool known = parts_of(before, after->model.effect[place].kind) > 0 || gap_model_is_part(&after->model, place);
     if (known && adds && gap_model_kinds(&after->model) <= gap_model_kinds(&before->model) &&
         !repeats_kind(&after->model)) {
         return search_is_better(before, after); /* more of the same kind */

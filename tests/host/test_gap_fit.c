@@ -94,7 +94,7 @@ static double rms_of_difference(const double *a, const double *b, size_t count) 
 
 /* Gas, tip, and a tip of which every sample is asked for. */
 static void coarse_replay_of_the_base_is_the_fine_one(void **state) {
-    static const char *const bases[] = {"creep:amplitude=0.05", "line_volume:volume=1e-6", "supply_droop", "tip_latency"};
+    static const char *const bases[] = {"creep:amplitude=0.05", "line_volume:volume=1e-6", "supply_droop", "tip_latency", "tip_freeze"};
     static struct bench bench;
     (void)state;
     bench_open(&bench, &(struct recording){.seconds = SECONDS, .seed = 3});
@@ -146,30 +146,59 @@ static void coarse_replay_tells_what_an_effect_changes(void **state) {
     assert_coarse_tells(&bench, "pressure_gain:gain=1.03", 0.015);
     assert_coarse_tells(&bench, "line_volume:volume=1e-6", 0.04);
     assert_coarse_tells(&bench, "supply_droop", 0.015);
+    assert_coarse_tells(&bench, "tip_latency:delay=0.0123", 0.2); /* seen: 15 %, of a pulse at another phase; so bases follow the age */
     bench_close(&bench);
 }
 
-/* Between two samples the tip pulses as the valves do: poses of then are taken, none between those of the samples. */
+/* Between two samples the tip pulses as the valves do: poses of then are taken, none between those of the samples. What acts
+ * besides acts from the start. */
 static void old_poses_are_those_of_then(void **state) {
-    static const double old_s[] = {0.0, 0.0123, 0.0305, 0.05};
+    static const double old_s[] = {0.0, 0.0123, 0.0305, 0.147};
     static struct bench bench;
-    double prompt_rms = 0.0;
+    double prompt_m = 0.0;
     (void)state;
     for (size_t i = 0; i < sizeof old_s / sizeof old_s[0]; i++) {
-        struct gap_model model = model_with("tip_latency");
+        struct gap_model model = model_with("tip_offset:x=0.001,y=-0.002,z=0.001");
+        struct effect latency = effect_of("tip_latency");
         struct stand stand;
         double sum = 0.0;
-        model.effect[0].parameter[0] = old_s[i];
-        bench_open_shifted(&bench, &(struct recording){.seconds = SECONDS, .silent = true}, 0, old_s[i]);
+        latency.parameter[0] = old_s[i];
+        gap_model_add(&model, &latency);
+        bench_open_shifted(&bench, &(struct recording){.effect = {"tip_offset:x=0.001,y=-0.002,z=0.001"}, .seconds = SECONDS, .silent = true},
+                           0, old_s[i]);
         stand_open(&stand, &bench, false, &model);
         fitter_evaluate(&stand.fitter, &model);
         const struct replay_run *run = &bench.fine.run[0];
-        for (size_t k = run->tip_at; k < run->tip_at + REPLAY_TIP_CHANNELS * run->tip_blocks; k += REPLAY_TIP_CHANNELS) {
-            sum += bench.fine.weight[k] > 0.0 ? pow(stand.fitter.residual[k] / bench.fine.weight[k], 2.0) : 0.0;
+        for (size_t k = run->tip_at; k < run->tip_at + REPLAY_TIP_CHANNELS * run->tip_blocks; k++) {
+            const bool position = (k - run->tip_at) % REPLAY_TIP_CHANNELS < 3 && bench.fine.weight[k] > 0.0;
+            sum += position ? pow(stand.fitter.residual[k] / bench.fine.weight[k], 2.0) : 0.0;
         }
-        const double rms_m = sqrt(sum / (double)run->tip_blocks);
-        prompt_rms = i == 0 ? rms_m : prompt_rms;
-        assert_under(rms_m, 1.5 * prompt_rms);
+        prompt_m = i == 0 ? sqrt(sum) : prompt_m;
+        if (i > 0) {
+            assert_under(sqrt(sum), 1.5 * prompt_m);
+        }
+        stand_close(&stand);
+        bench_close(&bench);
+    }
+}
+
+/* The simulator's own old poses, too. */
+static void simulated_latency_is_replayed(void **state) {
+    static const char *const late[] = {"tip_latency:delay=0.03", "tip_latency:delay=0.0123", "tip_latency:delay=0.025"};
+    static struct bench bench;
+    (void)state;
+    for (size_t i = 0; i < sizeof late / sizeof late[0]; i++) {
+        const struct gap_model model = model_with(late[i]);
+        struct stand stand;
+        struct fit fit = {.model = model};
+        bench_open(&bench, &(struct recording){.effect = {late[i], "tip_offset:x=0.001,y=0,z=0"}, .seconds = SECONDS, .seed = 3});
+        gap_model_add(&fit.model, &(struct effect){0});
+        fit.model.effect[1] = effect_of("tip_offset:x=0.001,y=0,z=0");
+        stand_open(&stand, &bench, false, &fit.model);
+        fitter_run(&stand.fitter, &fit, 0, false);
+        for (int out = 0; out < 2; out++) {
+            assert_under(fit_structure_of(&fit.sums, out, FIT_TIP), 0.5); /* seen: 0.42 half way through a pulse, else 0.02 */
+        }
         stand_close(&stand);
         bench_close(&bench);
     }
@@ -375,7 +404,7 @@ static void error_that_alternates_is_not_taken_for_noise(void **state) {
     for (int out = 0; out < 2; out++) {
         const struct fit_part *part = &after.sums.part[out][FIT_TIP];
         assert_true(part->noise / part->noise_count > 10.0); /* most of it, by its neighbours */
-        assert_true(fit_structure_of(&after.sums, out, FIT_TIP) > part->square / part->count - 1.5);
+        assert_true(fit_structure_of(&after.sums, out, FIT_TIP) > part->square / part->count - 2.0);
         assert_under(fit_structure_of(&before.sums, out, FIT_TIP), 0.2);
     }
     bench_close(&bench);
@@ -477,6 +506,7 @@ int main(void) {
     const struct CMUnitTest tests[] = {cmocka_unit_test(coarse_replay_of_the_base_is_the_fine_one),
                                        cmocka_unit_test(coarse_replay_tells_what_an_effect_changes),
                                        cmocka_unit_test(old_poses_are_those_of_then),
+                                       cmocka_unit_test(simulated_latency_is_replayed),
                                        cmocka_unit_test(bearing_is_found_across_the_half_turn),
                                        cmocka_unit_test(parameters_are_found_without_noise),
                                        cmocka_unit_test(parameters_are_found_through_noise),

@@ -22,7 +22,7 @@ static struct fit leaving(double pressures, double tip, const char *first, const
         gap_model_add(&fit.model, &effect);
     }
     for (size_t g = 0; g < FIT_GROUPS; g++) {
-        fit.sums.part[1][g] = (struct fit_part){COUNT * (left[g] + NOISE), COUNT, COUNT * NOISE, COUNT};
+        fit.sums.part[1][g] = (struct fit_part){COUNT * (left[g] + NOISE), COUNT, COUNT * NOISE, COUNT, 1.2};
     }
     return fit;
 }
@@ -77,6 +77,25 @@ static void what_makes_an_effect_its_part_is_not_more_of_the_same(void **state) 
     assert_false(earns(&before, &bent));
 }
 
+/* .. but once it bends, they are more of the same. */
+static void part_of_a_bent_field_is_more_of_the_same(void **state) {
+    const struct fit before = leaving(0.0, 3.0, "tip_distortion:form=1", NULL);
+    const struct fit with = leaving(0.0, 2.2, "tip_distortion:form=1", "tip_offset");
+    (void)state;
+    search.recalibrated = leaving(0.0, 1000.0, NULL, NULL);
+    assert_true(earns(&before, &with));
+}
+
+/* A rest elsewhere than the gap lies is small beside the whole, however large a share of that place it is. */
+static void rest_elsewhere_is_small_beside_the_whole(void **state) {
+    const struct fit before = leaving(0.8, 10.0, "contact", NULL);
+    const struct fit halved = leaving(0.35, 10.0, "contact", "line_volume"), gone = leaving(0.0, 10.0, "contact", "line_volume");
+    (void)state;
+    search.recalibrated = leaving(1.0, 9000.0, NULL, NULL);
+    assert_false(earns(&before, &halved));
+    assert_true(earns(&before, &gone));
+}
+
 /* After geometry, scale and timing of sensors, however little is left is another effect's; after a law of the body it is not. */
 static void rest_of_exact_effects_is_not_their_form(void **state) {
     (void)state;
@@ -107,6 +126,11 @@ static void what_another_explains_better_gives_no_place(void **state) {
     assert_true(search_is_forestalled(&search, &before, &line, &bent));
     assert_false(search_is_forestalled(&search, &before, &line, &elsewhere));
     assert_false(search_is_forestalled(&search, &before, &creep, &line));
+    const struct fit exact = leaving(0.06, 0.6, "tip_lever_arm", NULL);
+    const struct fit volume = leaving(0.0, 0.25, "tip_lever_arm", "line_volume");
+    const struct fit hair = leaving(0.0, 0.249, "tip_lever_arm", "creep"), much = leaving(0.0, 0.05, "tip_lever_arm", "creep");
+    assert_false(search_is_forestalled(&search, &exact, &volume, &hair)); /* better by a hair */
+    assert_true(search_is_forestalled(&search, &exact, &volume, &much));
 }
 
 int main(void) {
@@ -114,6 +138,8 @@ int main(void) {
                                        cmocka_unit_test(small_rest_may_be_the_form),
                                        cmocka_unit_test(one_form_of_a_bent_field_is_no_simple_effect),
                                        cmocka_unit_test(what_makes_an_effect_its_part_is_not_more_of_the_same),
+                                       cmocka_unit_test(part_of_a_bent_field_is_more_of_the_same),
+                                       cmocka_unit_test(rest_elsewhere_is_small_beside_the_whole),
                                        cmocka_unit_test(rest_of_exact_effects_is_not_their_form),
                                        cmocka_unit_test(what_another_explains_better_gives_no_place)};
     return cmocka_run_group_tests(tests, NULL, NULL);

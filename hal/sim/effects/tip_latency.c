@@ -83,6 +83,9 @@ static void read_between(double *state, size_t back, double time_s, struct tip_p
 
 static void delay(double *state, const double *parameter, struct effect_signals *signals) {
     const double wanted_s = signals->time_s - parameter[DELAY];
+    if (signals->aged) {
+        return;
+    }
     remember(state, signals->time_s, signals->pose);
     if (wanted_s >= signals->time_s) {
         return;
