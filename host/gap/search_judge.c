@@ -4,7 +4,8 @@
 
 #define GAIN_SHARE 0.03      /* an effect must take off this share of the held-out squares .. */
 #define GAIN_SIGMA 40.0      /* .. and so much that noise does not */
-#define COMPLETING_SHARE 0.5 /* of what is left, that a further effect must explain */
+#define COMPLETING_SHARE 0.5 /* of what is left, that a further effect must explain .. */
+#define LEFT_OF_MUCH 0.7     /* .. or of much that is left, this may stay */
 #define BESIDE_EXACT_SHARE 0.1 /* of the squares that exact effects leave, noise and all, that a further one must explain */
 #define FORESTALLED_SHARE 0.25 /* of what is left, that another explains more of */
 /* Shares of the gap, in pressures or at the tip: */
@@ -132,8 +133,9 @@ static bool completes_in(const struct search *search, const struct fit *before, 
     const double polish = is_exact(&before->model) ? EXACT_SHARE : POLISH_SHARE;
     const double share = left / fmax(fit_structure_of(&search->recalibrated.sums, 1, group), left);
     const bool halves = then < (1.0 - COMPLETING_SHARE) * left;
-    const double of_whole = left / fmax(MATERIAL_SHARE * search_structure(&search->recalibrated), left);
-    const bool most = then < (1.0 - COMPLETING_SHARE) * fmin(share / polish, of_whole) * left;
+    const double of_whole = left / fmax(MATERIAL_SHARE * search_structure(&search->recalibrated), STRUCTURE_LEAST);
+    const double may_be_left = (1.0 - COMPLETING_SHARE) * fmin(share / polish, of_whole);
+    const bool most = then < fmin(may_be_left, LEFT_OF_MUCH) * left;
     const bool whole = left > 3.0 * STRUCTURE_LEAST && then < fmax(unexplained * left, STRUCTURE_LEAST);
     const bool trace = left > TRACE_SIGNAL * STRUCTURE_LEAST && then < (1.0 - TRACE_SHARE) * left;
     const double form = form_share(before, group);
@@ -205,7 +207,8 @@ bool search_earns_place(const struct search *search, const struct fit *before, c
     const size_t place = added(before, after);
     const bool adds = after->model.effect[place].kind->forms_add || gap_model_is_part(&after->model, place);
     /* a bent field beside what could be a part of it is new */
-    const bool known = parts_of(before, after->model.effect[place].kind) > 0 || gap_model_is_part(&after->model, place);
+    const struct effect_kind *kind = after->model.effect[place].kind;
+    const bool known = parts_of(before, kind) > 0 || (!kind->forms_add && gap_model_is_part(&after->model, place));
     if (known && adds && gap_model_kinds(&after->model) <= gap_model_kinds(&before->model) &&
         !repeats_kind(&after->model)) {
         return search_is_better(before, after); /* more of the same kind */

@@ -42,12 +42,12 @@ static void first_effect_explains_a_share_of_the_gap(void **state) {
 
 /* The smaller the rest, the more of it must be explained. */
 static void small_rest_may_be_the_form(void **state) {
-    static const double rest[] = {40.0, 10.0, 2.0};        /* of 1000: 4, 1 and 0.2 % */
-    static const double enough[] = {0.45, 0.15, 0.04};     /* of it, left */
-    static const double too_much[] = {0.55, 0.25, 0.12};
+    static const double rest[] = {100.0, 25.0, 10.0, 2.0}; /* of 1000: 10, 2.5, 1 and 0.2 % */
+    static const double enough[] = {0.65, 0.45, 0.15, 0.04}; /* of it, left */
+    static const double too_much[] = {0.75, 0.55, 0.25, 0.12};
     (void)state;
     search.recalibrated = leaving(0.0, 1000.0, NULL, NULL);
-    for (size_t i = 0; i < 3; i++) {
+    for (size_t i = 0; i < 4; i++) {
         const struct fit before = leaving(0.0, rest[i], "gravity", NULL);
         const struct fit enough_of_it = leaving(0.0, enough[i] * rest[i], "gravity", "tip_lever_arm");
         const struct fit too_little = leaving(0.0, too_much[i] * rest[i], "gravity", "tip_lever_arm");
@@ -70,10 +70,14 @@ static void one_form_of_a_bent_field_is_no_simple_effect(void **state) {
 /* A misalignment is a part of a bent field, and yet a field beside it is something new. */
 static void what_makes_an_effect_its_part_is_not_more_of_the_same(void **state) {
     const struct fit before = leaving(0.0, 0.5, "tip_misalignment", NULL);
-    const struct fit bent = leaving(0.0, 0.3, "tip_misalignment", "tip_distortion:form=1");
+    struct fit bent = leaving(0.0, 0.3, "tip_misalignment", "tip_distortion:form=1");
+    struct effect other_form = bent.model.effect[1];
     (void)state;
     search.recalibrated = leaving(0.0, 1000.0, NULL, NULL);
     assert_true(search_is_better(&before, &bent));
+    assert_false(earns(&before, &bent));
+    other_form.form = 2;
+    gap_model_add(&bent.model, &other_form);
     assert_false(earns(&before, &bent));
 }
 
