@@ -65,7 +65,7 @@ struct replay {
     bool rigid;        /* pressures are as the duties make them, but for a constant: the tip then tells of them finest */
     double *weight;    /* [residuals] 1 / (noise of a block) */
     /* What noise may at most make of a mean square by neighbours' differences: twice what it makes where nothing pulses, by their
-     * median. What differs by more is an error that alternates, as that of a pulse's timing does. */
+     * median. What differs by more is an error that alternates, as that of a pulse's timing does. Infinite without duties. */
     double noise_most[FIT_GROUPS];
     uint8_t *held_out; /* [residuals] 1: not used to fit */
     struct replay_elsewhere elsewhere;

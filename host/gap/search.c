@@ -95,8 +95,9 @@ static bool look_closer(struct search *search, struct search_workspace *room, bo
     return sound;
 }
 
-/* Leave out again what no longer earns its place. */
+/* Leave out again what no longer earns its place; yet what goes form by form, none of which is much, may be much together. */
 static void drop_idle(struct search *search) {
+    const struct fit all = search->best;
     struct fit_base base;
     struct search_crew crew = {NULL, 0};
     bool dropped = search->best.model.count > 1;
@@ -122,6 +123,9 @@ static void drop_idle(struct search *search) {
                 break;
             }
         }
+    }
+    if (gap_model_kinds(&search->best.model) < gap_model_kinds(&all.model) && search_earns_place(search, &search->best, &all)) {
+        search->best = all;
     }
 }
 
