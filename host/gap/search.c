@@ -230,7 +230,8 @@ bool search_run(struct search *search, const struct gap_data *data, const struct
         room->candidates = search_list_candidates(search, room->list);
         sound = take_repeats(search, 0);
     }
-    const bool faint = search_structure(&search->best) < FAINT && search_all_have_duties(data);
+    const bool faint =
+        search->best.model.count == 0 && search_structure(&search->best) < FAINT && search_all_have_duties(data);
     for (size_t step = search->best.model.count;
          step < SEARCH_STEPS_MAX && sound && !search_stopped(search) && !faint; step++) {
         if (search->best.model.count + 3 > GAP_EFFECTS_MAX) {
