@@ -28,7 +28,8 @@ struct search;
  * A kind is believed in proportion to exp(-sum of (squares - best one's) / scale - parameters / 10) / sqrt(parameters), over
  * pressures and tip; the tenth is what a parameter fits of noise by chance (Akaike 1974), on that scale. The scale is ten times
  * what noise makes of the squares, plus a five hundredth of what the effect takes off, for what the form of a right effect may be
- * off by, plus a quarter of what the best there leaves beyond noise, by which forms are seen to be off. */
+ * off by, plus a quarter of what the best there leaves beyond noise, by which forms are seen to be off. For an effect that hardly
+ * acts on the pressures, what counts there is what all effects take off, by the greatest doubt of those that do act on them. */
 bool rivals_find(struct search *search);
 
 #endif

@@ -256,7 +256,8 @@ static void stop_ends_the_search_soon(void **state) {
 int main(void) {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(two_effects_are_both_named),
-                                       cmocka_unit_test(small_effect_beside_a_sensors_geometry_is_named),           cmocka_unit_test(effect_that_is_left_out_is_not_named),
+        cmocka_unit_test(small_effect_beside_a_sensors_geometry_is_named),
+        cmocka_unit_test(effect_that_is_left_out_is_not_named),
         cmocka_unit_test(name_beside_one_that_was_not_tried_is_half_sure),
         cmocka_unit_test(repeats_from_mid_run_have_their_onset_and_share),
         cmocka_unit_test(effect_from_mid_run_has_its_onset),
