@@ -5,7 +5,9 @@
 #define GAIN_SHARE 0.03      /* an effect must take off this share of the held-out squares .. */
 #define GAIN_SIGMA 40.0      /* .. and so much that noise does not */
 #define COMPLETING_SHARE 0.5 /* of what is left, that a further effect must explain .. */
-#define LEFT_OF_MUCH 0.7     /* .. or of much that is left, this may stay */
+#define LEFT_OF_MUCH 0.7     /* .. or of much that is left, this may stay, .. */
+#define LAWFUL 0.1           /* .. by effects whose laws are no more in doubt than that */
+#define TWICE_THE_DOUBT 4.0  /* of a law, in squares: what it leaves may be less */
 #define BESIDE_EXACT_SHARE 0.1 /* of the squares that exact effects leave, noise and all, that a further one must explain */
 #define FORESTALLED_SHARE 0.25 /* of what is left, that another explains more of */
 /* Shares of the gap, in pressures or at the tip: */
@@ -122,6 +124,14 @@ static bool is_exact(const struct gap_model *model) {
     return exact;
 }
 
+static bool is_lawful(const struct gap_model *model) {
+    bool lawful = true;
+    for (size_t e = 0; e < model->count; e++) {
+        lawful = lawful && effect_doubt(model->effect[e].kind) <= LAWFUL;
+    }
+    return lawful;
+}
+
 /* A further effect must be the rest of the explanation, of the pressures or of the tip; not polish on a form
  * that only nearly fits. A small rest may as well be the form: the smaller its share of the gap is, the more of it must a
  * simple effect explain, as no form's error is likely to be just what another effect does. */
@@ -130,20 +140,21 @@ static bool completes_in(const struct search *search, const struct fit *before, 
     const bool simple = parts_of(after, kind) == 1 && !kind->forms_add;
     const double law = effect_doubt(kind), unexplained = fmin(fmax(1.0 - WHOLE_SHARE, law * law), UNEXPLAINED_MOST);
     const double left = fit_structure_of(&before->sums, 1, group), then = fit_structure_of(&after->sums, 1, group);
-    const double polish = is_exact(&before->model) ? EXACT_SHARE : POLISH_SHARE;
+    const double form = form_share(before, group), polish = is_exact(&before->model) ? EXACT_SHARE : POLISH_SHARE;
     const double share = left / fmax(fit_structure_of(&search->recalibrated.sums, 1, group), left);
     const bool halves = then < (1.0 - COMPLETING_SHARE) * left;
     const double of_whole = left / fmax(MATERIAL_SHARE * search_structure(&search->recalibrated), STRUCTURE_LEAST);
     const double may_be_left = (1.0 - COMPLETING_SHARE) * fmin(share / polish, of_whole);
-    const bool most = then < fmin(may_be_left, LEFT_OF_MUCH) * left;
+    const double of_much = is_lawful(&before->model) ? LEFT_OF_MUCH : 1.0 - COMPLETING_SHARE;
+    const bool most = then < fmin(may_be_left, of_much) * left;
     const bool whole = left > 3.0 * STRUCTURE_LEAST && then < fmax(unexplained * left, STRUCTURE_LEAST);
     const bool trace = left > TRACE_SIGNAL * STRUCTURE_LEAST && then < (1.0 - TRACE_SHARE) * left;
-    const double form = form_share(before, group);
+    const bool over_form = share > TWICE_THE_DOUBT * form;
     const bool untouched = group == FIT_PRESSURE && !acts_on_pressures(&before->model) && left > UNTOUCHED_LEAST &&
                            then < UNTOUCHED_LEFT * left;
     const bool of_form = is_left(search, before, group, fmax(FORM_LEAST, form), ELSEWHERE_SHARE);
     return (simple && untouched) || (is_left(search, before, group, polish, MATERIAL_SHARE) && halves) ||
-           (simple && ((of_form && (whole || most)) ||
+           (simple && ((of_form && (whole || (most && over_form))) ||
                        (is_left(search, before, group, fmax(TRACE_LEAST, form), ELSEWHERE_SHARE) && trace)));
 }
 

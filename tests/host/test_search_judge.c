@@ -56,6 +56,17 @@ static void small_rest_may_be_the_form(void **state) {
     }
 }
 
+/* .. the more so where the law itself is in doubt: the rest of a loop's shape is no creep. */
+static void much_that_is_left_may_be_the_form_of_a_doubtful_law(void **state) {
+    (void)state;
+    search.recalibrated = leaving(0.0, 36.0, NULL, NULL);
+    for (int lawful = 0; lawful < 2; lawful++) {
+        const char *const first = lawful == 1 ? "end_restraint" : "hysteresis";
+        const struct fit before = leaving(0.0, 2.0, first, NULL), with = leaving(0.0, 1.1, first, "creep");
+        assert_int_equal(earns(&before, &with), lawful);
+    }
+}
+
 /* What a bent field does in one form another law of the body does, too. */
 static void one_form_of_a_bent_field_is_no_simple_effect(void **state) {
     const struct fit before = leaving(0.0, 5.0, "gravity", NULL);
@@ -140,6 +151,7 @@ static void what_another_explains_better_gives_no_place(void **state) {
 int main(void) {
     const struct CMUnitTest tests[] = {cmocka_unit_test(first_effect_explains_a_share_of_the_gap),
                                        cmocka_unit_test(small_rest_may_be_the_form),
+                                       cmocka_unit_test(much_that_is_left_may_be_the_form_of_a_doubtful_law),
                                        cmocka_unit_test(one_form_of_a_bent_field_is_no_simple_effect),
                                        cmocka_unit_test(what_makes_an_effect_its_part_is_not_more_of_the_same),
                                        cmocka_unit_test(part_of_a_bent_field_is_more_of_the_same),

@@ -75,7 +75,7 @@ static const struct effect_kind line_resistance = {
     .form_what = {"the same share of every flow", "laminar: large flows are held back more than small ones"},
     .parameter_count = 1,
     .parameter = {[CONDUCTANCE_SCALE] = {"conductance_scale", "1", 0.1, 1.2, 0.6, 1.0}},
-    .doubt = {[CONDUCTANCE_SCALE] = 0.08}, /* between laminar and turbulent */
+    .doubt = {[CONDUCTANCE_SCALE] = 0.1}, /* between laminar and turbulent, before the valve or behind it */
     .gas = step};
 
 EFFECT_REGISTER(line_resistance);
