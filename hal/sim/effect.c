@@ -74,6 +74,15 @@ double effect_doubt(const struct effect_kind *kind) {
     return isfinite(doubt) ? doubt : 0.0;
 }
 
+double effects_age_s(const struct effect *effect, size_t count, double time_s) {
+    double age_s = 0.0;
+    for (size_t e = 0; e < count; e++) {
+        const struct effect_kind *kind = effect[e].kind;
+        age_s += kind->age_s != NULL && time_s >= effect[e].onset_s ? kind->age_s(effect[e].parameter) : 0.0;
+    }
+    return age_s;
+}
+
 bool effect_has(const struct effect_kind *kind, enum effect_hook_kind hook) {
     return hook_of(kind, hook) != NULL;
 }

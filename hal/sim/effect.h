@@ -130,6 +130,8 @@ void effect_init(struct effect *effect, const struct effect_kind *kind);
 bool effect_parse(const char *text, struct effect *effect, char *error, size_t error_bytes);
 /* Of its law: the least doubt, over the parameters that have one; 0: none has. */
 double effect_doubt(const struct effect_kind *kind);
+/* By how much the tip sensor's poses are then older than their times say. */
+double effects_age_s(const struct effect *effect, size_t count, double time_s);
 bool effect_has(const struct effect_kind *kind, enum effect_hook_kind hook);
 /* Call that hook of each effect that has it, within its chamber and after its onset; before that, a latent one unseen. */
 void effects_run(struct effect *effect, size_t count, enum effect_hook_kind hook, struct effect_signals *signals);

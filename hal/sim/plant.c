@@ -140,15 +140,6 @@ static void recall_or_now(const struct plant *plant, double time_s, double age_s
     }
 }
 
-static double age_at(const struct plant *plant, double time_s) {
-    double age_s = 0.0;
-    for (size_t e = 0; e < plant->effect_count; e++) {
-        const struct effect *effect = &plant->effect[e];
-        age_s += effect->kind->age_s != NULL && time_s >= effect->onset_s ? effect->kind->age_s(effect->parameter) : 0.0;
-    }
-    return age_s;
-}
-
 void plant_step(struct plant *plant, bool supply_open, int64_t from_us, int64_t to_us) {
     struct effect_signals signals = signals_at(plant, 1e-6 * (double)from_us, 1e-6 * (double)(to_us - from_us));
     reset_influence(plant);
@@ -176,7 +167,7 @@ void plant_sample_tip(struct plant *plant, const double *pressure_pa, double tim
     const double scale = plant->parameters.gas.stiffness_scale;
     /* beyond the snap its own past is not told by pressures: there the pose hook has to do */
     const bool aged = pressure_pa == NULL && plant->past.count > 0 && plant->chambers.ballooned == CHAMBERS_NONE;
-    const double age_s = aged ? age_at(plant, time_s) : 0.0;
+    const double age_s = aged ? effects_age_s(plant->effect, plant->effect_count, time_s) : 0.0;
     double past_pa[3];
     recall_or_now(plant, time_s, age_s, past_pa);
     const double *pressure = pressure_pa != NULL ? pressure_pa : past_pa;

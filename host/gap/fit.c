@@ -536,6 +536,10 @@ void fitter_run(struct fitter *fitter, struct fit *fit, int rounds, bool fit_nom
     fit->sound = isfinite(cost);
 }
 
+static double age_of(const struct gap_model *model) {
+    return effects_age_s(model->effect, model->count, INFINITY);
+}
+
 bool fit_rebased(const struct replay *fine, const struct replay *coarse, struct fit *fit, int rounds) {
     bool sound = true, moved = true;
     for (int i = 0; i < REBASES && sound && moved; i++) {
@@ -552,7 +556,7 @@ bool fit_rebased(const struct replay *fine, const struct replay *coarse, struct 
         }
         moved = fabs(fit->model.stiffness_scale - base.model.stiffness_scale) > MOVED_LITTLE ||
                 fabs(fit->model.supply_scale - base.model.supply_scale) > MOVED_LITTLE ||
-                fabs(gap_model_age_s(&fit->model, INFINITY) - gap_model_age_s(&base.model, INFINITY)) > AGED_LITTLE_S;
+                fabs(age_of(&fit->model) - age_of(&base.model)) > AGED_LITTLE_S;
         fit_base_close(&base);
     }
     return sound;

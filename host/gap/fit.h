@@ -64,8 +64,7 @@ void fitter_evaluate(struct fitter *fitter, const struct gap_model *model);
 /* At most `rounds` steps from fit->model. `fit_nominal`: stiffness and supply move too. */
 void fitter_run(struct fitter *fitter, struct fit *fit, int rounds, bool fit_nominal);
 /* The same from bases of its own, as often as the nominal parameters or the tip's age move so far that a base no longer tells of
- * them. False:
- * out of memory. */
+ * them. False: out of memory. */
 bool fit_rebased(const struct replay *fine, const struct replay *coarse, struct fit *fit, int rounds);
 /* By how much pressure residuals would shrink, to first order, were the effect added to the base on all chambers [0] or on
  * one [1..3] at some size; negative where only the opposite effect would help. */

@@ -93,12 +93,3 @@ size_t gap_model_kinds(const struct gap_model *model) {
     }
     return kinds;
 }
-
-double gap_model_age_s(const struct gap_model *model, double time_s) {
-    double age_s = 0.0;
-    for (size_t e = 0; e < model->count; e++) {
-        const struct effect *effect = &model->effect[e];
-        age_s += effect->kind->age_s != NULL && time_s >= effect->onset_s ? effect->kind->age_s(effect->parameter) : 0.0;
-    }
-    return age_s;
-}

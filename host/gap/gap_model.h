@@ -42,7 +42,5 @@ size_t gap_model_kinds(const struct gap_model *model);
 /* Does the effect act before the pressure readings (supply, valves, pressure sensors)? */
 bool gap_effect_upstream(const struct effect_kind *kind);
 bool gap_effect_downstream(const struct effect_kind *kind);
-/* By how much the tip sensor's poses are older than a time says. */
-double gap_model_age_s(const struct gap_model *model, double time_s);
 
 #endif

@@ -88,7 +88,7 @@ void replay_tip_of_run(const struct replay *replay, const struct gap_model *mode
         }
         plant.temperature_k = replay_temperature_at(data, row);
         /* not before it began: there nothing acts */
-        const double age_s = data->sim_tip != NULL ? 0.0 : gap_model_age_s(model, tip->time_s);
+        const double age_s = data->sim_tip != NULL ? 0.0 : effects_age_s(model->effect, model->count, tip->time_s);
         const double time_s = fmax(tip->time_s - age_s, fmin(tip->time_s, 1e-6 * (double)run->start_us));
         pressures_at(replay, state, index, time_s, from_duties, nudge_pa, nudged, pressure_pa);
         const double step_s = fmax(time_s - before_s, 1e-6), chance = tip->repeated ? 0.0 : 1.0;

@@ -191,11 +191,15 @@ static size_t list_differences(const struct replay *replay, const double *residu
 
 /* Pulses that err are only replayed where there are duties; without, noise is what it is, and not the same throughout. */
 static bool find_noise_most(struct replay *replay, const struct gap_model *model, const struct replay_state *state) {
-    double *residual = calloc(2 * replay->residuals + 1, sizeof *residual);
     bool pulses = true;
     for (size_t i = 0; i < replay->runs; i++) {
         pulses = pulses && replay->run[i].run->has_duty;
     }
+    if (!pulses) {
+        replay->noise_most[FIT_PRESSURE] = replay->noise_most[FIT_TIP] = INFINITY;
+        return true;
+    }
+    double *residual = calloc(2 * replay->residuals + 1, sizeof *residual);
     if (residual == NULL) {
         return false;
     }
@@ -206,7 +210,7 @@ static bool find_noise_most(struct replay *replay, const struct gap_model *model
         const size_t count = list_differences(replay, residual, (enum fit_group)group, half_square);
         qsort(half_square, count, sizeof half_square[0], by_size);
         const double quiet = count > 0 ? half_square[count / 2] / MEDIAN_OF_SQUARE : 0.0;
-        replay->noise_most[group] = pulses ? fmax(HEAVY_TAILS * quiet, NOISE_MOST_LEAST) : INFINITY;
+        replay->noise_most[group] = fmax(HEAVY_TAILS * quiet, NOISE_MOST_LEAST);
     }
     free(residual);
     return true;

@@ -91,6 +91,17 @@ static void name_beside_one_that_was_not_tried_is_half_sure(void **state) {
     }
 }
 
+/* Repeats are seen as such; what is faint beside them is looked for like any second effect. */
+static void effect_beside_repeats_is_named(void **state) {
+    (void)state;
+    diagnose("tip_freeze:fraction=0.35", "tip_latency:delay=0.007", NULL);
+    assert_verdict(diagnosis, GAP_EFFECTS);
+    assert_int_equal(diagnosis->effects, 2);
+    assert_non_null(diagnosed_effect(diagnosis, "tip_freeze"));
+    assert_non_null(diagnosed_effect(diagnosis, "tip_latency"));
+    diagnosed_close(&diagnosed);
+}
+
 /* Repeats that begin late are counted from there. */
 static void repeats_from_mid_run_have_their_onset_and_share(void **state) {
     (void)state;
@@ -259,6 +270,7 @@ int main(void) {
         cmocka_unit_test(small_effect_beside_a_sensors_geometry_is_named),
         cmocka_unit_test(effect_that_is_left_out_is_not_named),
         cmocka_unit_test(name_beside_one_that_was_not_tried_is_half_sure),
+        cmocka_unit_test(effect_beside_repeats_is_named),
         cmocka_unit_test(repeats_from_mid_run_have_their_onset_and_share),
         cmocka_unit_test(effect_from_mid_run_has_its_onset),
         cmocka_unit_test(effect_that_sets_in_late_is_not_taken_for_another),
