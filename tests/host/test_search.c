@@ -94,7 +94,7 @@ static void name_beside_one_that_was_not_tried_is_half_sure(void **state) {
 /* Repeats are seen as such; what is faint beside them is looked for like any second effect. */
 static void effect_beside_repeats_is_named(void **state) {
     (void)state;
-    diagnose("tip_freeze:fraction=0.35", "tip_latency:delay=0.007", NULL);
+    diagnose("tip_freeze:fraction=0.35", "tip_latency:delay=0.004", NULL);
     assert_verdict(diagnosis, GAP_EFFECTS);
     assert_int_equal(diagnosis->effects, 2);
     assert_non_null(diagnosed_effect(diagnosis, "tip_freeze"));
