@@ -7,8 +7,10 @@
 
 /* A gap whose structure is below this share of the noise floor's square is none. */
 #define STRUCTURE_NONE 0.3
-/* Recalibration is the answer where it leaves no more than that, or this share of what was there. */
-#define RECALIBRATED_SHARE 0.05
+/* Recalibration is the answer where it leaves no more than that, or this share of what was there: a thirtieth of the gap's size,
+ * which the table's own errors reach. */
+#define RECALIBRATED_SHARE 0.001
+#define RECALIBRATED_SHARE_STRANGE 0.05 /* of another simulator, whose tip goes its own ways */
 /* Catalogue effects must close this share of the structured gap, or the gap is of an unknown kind. */
 #define CLOSED_LEAST 0.97
 /* By several, or by one of many forms: they can bend to much that they are not. */
@@ -206,7 +208,8 @@ static void decide(struct diagnosis *diagnosis, const struct search *search) {
         return;
     }
     if (search->best.model.count == 0) {
-        if (fmin(before, recalibrated) > STRUCTURE_NONE && recalibrated > RECALIBRATED_SHARE * before) {
+        const double share = diagnosis_is_strange(search) ? RECALIBRATED_SHARE_STRANGE : RECALIBRATED_SHARE;
+        if (fmin(before, recalibrated) > STRUCTURE_NONE && recalibrated > share * before) {
             diagnosis->verdict = GAP_UNKNOWN;
         } else {
             diagnosis->verdict =

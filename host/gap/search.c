@@ -141,15 +141,32 @@ static double belief_in_held(const struct search *search, const struct rivals *r
     return 0.0;
 }
 
+/* Those that gave way to a rival already. */
+struct overturned {
+    const struct effect_kind *kind[REVISIONS];
+    size_t count;
+};
+
+/* Of two that each speak for the other under their own weights, the one that leaves less stays. */
+static bool is_back(const struct search *search, const struct overturned *past, const struct rival *rival) {
+    bool was_held = false;
+    for (size_t i = 0; i < past->count; i++) {
+        was_held = was_held || past->kind[i] == rival->kind;
+    }
+    return was_held && search_structure(&rival->fit) > search_structure(&search->best);
+}
+
 /* What the comparison with rivals asks for: the rival that is believed in an effect's place, or the model
  * without an effect that could as well be others and is not needed. NULL: nothing. */
-static const struct fit *ask_rivals(const struct search *search) {
+static const struct fit *ask_rivals(const struct search *search, struct overturned *past) {
     const double all = search_structure(&search->recalibrated);
     for (size_t r = 0; r < search->rivals_count; r++) {
         const struct rivals *rivals = &search->rivals[r];
         const bool by_chance = search->best.model.effect[rivals->place].kind->by_chance;
         const double held = belief_in_held(search, rivals), best = rivals->rival[0].belief;
-        if (!by_chance && rivals->count > 1 && (held < DISBELIEVED || (held < best && best > BELIEVED))) {
+        if (!by_chance && rivals->count > 1 && (held < DISBELIEVED || (held < best && best > BELIEVED)) &&
+            !is_back(search, past, &rivals->rival[0])) {
+            past->kind[past->count++] = search->best.model.effect[rivals->place].kind;
             return &rivals->rival[0].fit;
         }
     }
@@ -168,13 +185,14 @@ static const struct fit *ask_rivals(const struct search *search) {
 /* Rivals are compared under the final weights: what they show may overturn what the search took on its way.
  * Tells whether it did. */
 static bool compare_rivals(struct search *search, bool *overturned) {
+    struct overturned past = {.count = 0};
     bool sound = true;
     *overturned = false;
     for (size_t round = 0;
          round <= REVISIONS && sound && !search_stopped(search) && search->best.model.count > 0; round++) {
         search_say(search, "rivals", round, REVISIONS);
         sound = rivals_find(search);
-        const struct fit *asked = sound && round < REVISIONS ? ask_rivals(search) : NULL;
+        const struct fit *asked = sound && round < REVISIONS ? ask_rivals(search, &past) : NULL;
         if (asked == NULL) {
             break;
         }

@@ -3,6 +3,7 @@
 
 #define SECONDS 6.0
 #define RUNS 2
+#define KINDS_MOST 64
 
 static struct diagnosed diagnosed;
 static const struct diagnosis *const diagnosis = &diagnosed.diagnosis;
@@ -30,6 +31,26 @@ static void stiffness_and_supply_that_are_off_are_recalibrated(void **state) {
     assert_under(diagnosis->stiffness_scale.high - diagnosis->stiffness_scale.low, 0.02);
     assert_true(diagnosis->closed_recalibration.value > 0.99);
     diagnosed_close(&diagnosed);
+}
+
+/* Nominal parameters that are far off hide no gap that is small beside them. Nothing is tried here, so nothing explains it. */
+static void what_recalibration_leaves_is_said(void **state) {
+    const char *names[KINDS_MOST];
+    struct search_options options = {.threads = 1, .without = names};
+    (void)state;
+    assert_true(effect_kind_count() <= KINDS_MOST);
+    for (; options.without_count < effect_kind_count(); options.without_count++) {
+        names[options.without_count] = effect_kind_at(options.without_count)->name;
+    }
+    for (int wrong = 0; wrong < 2; wrong++) {
+        diagnosed_open(&diagnosed,
+                       &(struct recording){.stiffness_scale = 1.3, .supply_scale = 0.95, .seconds = SECONDS, .runs = RUNS, .seed = 3,
+                                           .effect = {wrong ? "end_restraint:fraction=0.9" : NULL}},
+                       &options);
+        assert_verdict(diagnosis, wrong ? GAP_UNKNOWN : GAP_RECALIBRATE);
+        assert_true(diagnosis->structure[1] < 0.05 * diagnosis->structure[0]);
+        diagnosed_close(&diagnosed);
+    }
 }
 
 /* One effect, named, with its stage and chamber and every parameter within its interval. */
@@ -92,6 +113,7 @@ static void pressures_that_never_move_say_nothing(void **state) {
 int main(void) {
     const struct CMUnitTest tests[] = {cmocka_unit_test(nothing_wrong_is_no_gap),
                                        cmocka_unit_test(stiffness_and_supply_that_are_off_are_recalibrated),
+                                       cmocka_unit_test(what_recalibration_leaves_is_said),
                                        cmocka_unit_test(effect_of_the_supply_is_named),
                                        cmocka_unit_test(effect_of_the_valves_is_named),
                                        cmocka_unit_test(effect_of_a_pressure_sensor_is_named),
