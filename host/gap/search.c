@@ -5,11 +5,6 @@
 #include <string.h>
 
 #define REPEATS_CERTAIN 0.04 /* share of repeated samples that no noise makes */
-#define REVISIONS 3
-#define DISBELIEVED 0.1 /* an effect that its rivals leave so little belief gives way to the best of them, .. */
-#define BELIEVED 0.65   /* .. or to one that would be the verdict */
-#define DOUBTED 0.65    /* a further effect that its rivals leave less is left out, if the others .. */
-#define EXPLAINED_SHARE 0.03 /* .. leave no more than that of the gap by themselves */
 #define HOPELESS_SHARE 0.5 /* of the gap: where two effects leave more, a third does not explain it */
 
 static bool prepare(struct search *search) {
@@ -131,87 +126,15 @@ static void drop_idle(struct search *search) {
 
 /* --- rivals --- */
 
-static double belief_in_held(const struct search *search, const struct rivals *rivals) {
-    const struct effect_kind *held = search->best.model.effect[rivals->place].kind;
-    for (size_t i = 0; i < rivals->count; i++) {
-        if (rivals->rival[i].kind == held) {
-            return rivals->rival[i].belief;
-        }
-    }
-    return 0.0;
-}
-
-/* Those that gave way to a rival already. */
-struct overturned {
-    const struct effect_kind *kind[REVISIONS];
-    size_t count;
-};
-
-/* Of two that each speak for the other under their own weights, the one that leaves less stays. */
-static bool is_back(const struct search *search, const struct overturned *past, const struct rival *rival) {
-    bool was_held = false;
-    for (size_t i = 0; i < past->count; i++) {
-        was_held = was_held || past->kind[i] == rival->kind;
-    }
-    return was_held && search_structure(&rival->fit) > search_structure(&search->best);
-}
-
-/* What the comparison with rivals asks for: the rival that is believed in an effect's place, or the model
- * without an effect that could as well be others and is not needed. NULL: nothing. */
-static const struct fit *ask_rivals(const struct search *search, struct overturned *past) {
-    const double all = search_structure(&search->recalibrated);
-    for (size_t r = 0; r < search->rivals_count; r++) {
-        const struct rivals *rivals = &search->rivals[r];
-        const bool by_chance = search->best.model.effect[rivals->place].kind->by_chance;
-        const double held = belief_in_held(search, rivals), best = rivals->rival[0].belief;
-        if (!by_chance && rivals->count > 1 && (held < DISBELIEVED || (held < best && best > BELIEVED)) &&
-            !is_back(search, past, &rivals->rival[0])) {
-            past->kind[past->count++] = search->best.model.effect[rivals->place].kind;
-            return &rivals->rival[0].fit;
-        }
-    }
-    for (size_t r = 0; r < search->rivals_count; r++) {
-        const struct rivals *rivals = &search->rivals[r];
-        const bool by_chance = search->best.model.effect[rivals->place].kind->by_chance;
-        if (!by_chance && rivals->rest.sound && rivals->rest.model.count > 0 &&
-            belief_in_held(search, rivals) < DOUBTED &&
-            search_structure(&rivals->rest) < STRUCTURE_LEAST + EXPLAINED_SHARE * all) {
-            return &rivals->rest;
-        }
-    }
-    return NULL;
-}
-
-/* Rivals are compared under the final weights: what they show may overturn what the search took on its way.
- * Tells whether it did. */
-static bool compare_rivals(struct search *search, bool *overturned) {
-    struct overturned past = {.count = 0};
-    bool sound = true;
-    *overturned = false;
-    for (size_t round = 0;
-         round <= REVISIONS && sound && !search_stopped(search) && search->best.model.count > 0; round++) {
-        search_say(search, "rivals", round, REVISIONS);
-        sound = rivals_find(search);
-        const struct fit *asked = sound && round < REVISIONS ? ask_rivals(search, &past) : NULL;
-        if (asked == NULL) {
-            break;
-        }
-        search->best = *asked;
-        *overturned = true;
-        sound = search_recalibrate(search, &search->best, true);
-    }
-    return sound;
-}
-
 /* What was not worth adding to what the search took may be the rest of what the rivals put there. */
 static bool settle_with_rivals(struct search *search, struct search_workspace *room) {
     bool overturned;
-    bool sound = compare_rivals(search, &overturned);
+    bool sound = search_compare_rivals(search, &overturned);
     const size_t count = search->best.model.count;
     if (sound && overturned && count > 0 && count + 3 <= GAP_EFFECTS_MAX &&
         gap_model_kinds(&search->best.model) < SEARCH_STEPS_MAX && search_has_rest(search, &search->best) &&
         !search_stopped(search) && search_add_one(search, room, SEARCH_STEPS_MAX)) {
-        sound = search_recalibrate(search, &search->best, true) && compare_rivals(search, &overturned);
+        sound = search_recalibrate(search, &search->best, true) && search_compare_rivals(search, &overturned);
     }
     return sound;
 }

@@ -1,8 +1,9 @@
 /* What the parts of the search (search.c) ask of each other, in the order in which they are asked: which
  * candidates there are (search_catalogue.c), the few that are worth a closer fit (search_screen.c), what is
  * left to explain and what earns a place (search_judge.c), since when it acts (search_onset.c), all of that
- * for one effect more (search_step.c), and once again where something sets in late (search_late.c). The fits
- * of the whole and the threads stand in search_fits.c. For these files only. */
+ * for one effect more (search_step.c), once again where something sets in late (search_late.c), and what gives
+ * way to what could be in its place (search_revise.c). The fits of the whole and the threads stand in
+ * search_fits.c. For these files only. */
 #ifndef TRIBEND_GAP_SEARCH_PARTS_H
 #define TRIBEND_GAP_SEARCH_PARTS_H
 
@@ -13,6 +14,7 @@
 #define SEARCH_STARTS_PLACED 128
 #define REFINE_ROUNDS 6     /* of a fit in earnest */
 #define STRUCTURE_LEAST 0.2 /* mean square in units of a block's noise that is worth explaining */
+#define SEARCH_REVISIONS 3  /* by rivals, at most */
 #define FAINT 1.5 /* mean square below which a first effect, too, must explain most of what there is */
 
 struct search_candidate {
@@ -119,5 +121,21 @@ bool search_add_one(struct search *search, struct search_workspace *room, size_t
  * all are tried again from the onset that was found, or where none was, on the last part of the recording.
  * False: out of memory. */
 bool search_after_onset(struct search *search, struct search_workspace *room);
+
+/* --- search_revise.c --- */
+
+/* Those that gave way to a rival already. */
+struct search_past {
+    const struct effect_kind *kind[SEARCH_REVISIONS];
+    size_t count;
+};
+
+/* What the comparison with rivals asks for: the rival that is believed in an effect's place, or the model
+ * without an effect that could as well be others and is not needed. NULL: nothing. `past` notes who gives way; to be
+ * called SEARCH_REVISIONS times at most. */
+const struct fit *search_ask_rivals(const struct search *search, struct search_past *past);
+/* Rivals are compared under the final weights: what they show may overturn what the search took on its way.
+ * `overturned`: it did. False: out of memory. */
+bool search_compare_rivals(struct search *search, bool *overturned);
 
 #endif
