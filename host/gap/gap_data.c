@@ -13,7 +13,8 @@
 #define UNIT_TOLERANCE 0.05  /* of a quaternion's length */
 #define TELLING_LEAST 20    /* samples that say anything */
 #define WINDOW 15            /* samples on either side: longer than repeats go on .. */
-#define MOVED_M 6e-3         /* .. over which the tip moves so far that an exact repeat is no coincidence of the steps */
+#define MOVED_M 6e-3         /* .. over which the tip moves so far that an exact repeat is no coincidence of the steps, .. */
+#define TURNED_RAD 0.025     /* .. or turns so far on either side, where it never moves as far */
 #define FINE_LEAST 100       /* pairs of samples that tell whether steps are fine */
 #define FINE_SHARE 0.01      /* of their coordinates that are the same */
 #define ONSET_STEP_S 0.1     /* an onset of repeats is not sought closer than that */
@@ -87,15 +88,32 @@ static bool take_tip(struct gap_run *run, const struct run_log *log, size_t row,
     return true;
 }
 
-/* Does the tip move about this sample? Seen over a window, so that repeats themselves do not decide. */
-static bool is_moving(const struct gap_run *run, size_t i) {
-    const struct gap_tip *before = &run->tip[i >= WINDOW ? i - WINDOW : 0];
-    const struct gap_tip *after = &run->tip[i + WINDOW < run->tips ? i + WINDOW : run->tips - 1];
+static double moved_m(const struct gap_tip *from, const struct gap_tip *to) {
     double moved = 0.0;
     for (size_t k = 0; k < 3; k++) {
-        moved = hypot(moved, after->position_m[k] - before->position_m[k]);
+        moved = hypot(moved, to->position_m[k] - from->position_m[k]);
     }
-    return moved > MOVED_M;
+    return moved;
+}
+
+static double turned_rad(const struct gap_tip *from, const struct gap_tip *to) {
+    double along = 0.0;
+    for (size_t k = 0; k < 4; k++) {
+        along += to->quaternion[k] * from->quaternion[k];
+    }
+    return isnan(along) ? 0.0 : 2.0 * acos(fmin(fabs(along), 1.0));
+}
+
+/* Does the tip move about this sample? Seen over a window, so that repeats themselves do not decide. */
+static bool is_moving(const struct gap_run *run, size_t i) {
+    return moved_m(&run->tip[i >= WINDOW ? i - WINDOW : 0],
+                   &run->tip[i + WINDOW < run->tips ? i + WINDOW : run->tips - 1]) > MOVED_M;
+}
+
+/* .. or turn, before it and after it? That shows slower bends, of which the window holds a rest as well. */
+static bool is_turning(const struct gap_run *run, size_t i) {
+    return i >= WINDOW && i + WINDOW < run->tips && turned_rad(&run->tip[i - WINDOW], &run->tip[i]) > TURNED_RAD &&
+           turned_rad(&run->tip[i], &run->tip[i + WINDOW]) > TURNED_RAD;
 }
 
 /* Coordinates that come back one by one are those of a sensor with coarse steps, which may also all come back at once. */
@@ -117,8 +135,13 @@ static void find_repeats(struct gap_run *run) {
         run->tip[i].repeated = is_repeat(&run->tip[i], &run->tip[i - 1]);
     }
     const bool fine = has_fine_steps(run);
+    size_t telling = 0;
     for (size_t i = 1; i < run->tips; i++) {
         run->tip[i].telling = fine || is_moving(run, i);
+        telling += run->tip[i].telling ? 1 : 0;
+    }
+    for (size_t i = 1; i < run->tips && telling < TELLING_LEAST; i++) {
+        run->tip[i].telling = is_turning(run, i);
     }
 }
 
