@@ -1,7 +1,6 @@
 /* tribend hold: take over a motion that another host began, and keep its pressures until Ctrl-C; then vent.
  */
 #include <stdio.h>
-#include <time.h>
 
 #include "cli/commands.h"
 #include "cli/report_json.h"
@@ -26,22 +25,11 @@ static void say_held(const struct bus_options *options, const struct link_report
     (void)fflush(stdout);
 }
 
-/* Answered in time? A report may have waited here while this host did something else, so what is old by the controller's
- * clock has to be old by ours too. */
-static bool is_unanswered(const struct timespec *asked, int64_t since_us) {
-    struct timespec now;
-    (void)clock_gettime(CLOCK_MONOTONIC, &now);
-    const double waited_s = (double)(now.tv_sec - asked->tv_sec) + 1e-9 * (double)(now.tv_nsec - asked->tv_nsec);
-    return since_us > WITHIN_US && 1e6 * waited_s > (double)WITHIN_US;
-}
-
 /* From the first report that it is held, for as long as asked, or until it cannot be; an exit code. */
 static int hold(struct bus *bus, const struct bus_options *options, struct link_report *report) {
     const struct controller_command command = {.kind = COMMAND_HOLD};
-    const int64_t start_us = report->time_us;
+    const int64_t start_us = report->time_us, asked_us = program_now_us();
     int64_t end_us = INT64_MAX;
-    struct timespec asked;
-    (void)clock_gettime(CLOCK_MONOTONIC, &asked);
     while (report->time_us < end_us && program_interrupted == 0) {
         if (!bus->link.send(bus->link.context, &command) || !bus->link.receive(bus->link.context, report)) {
             return bus_gone(bus, options);
@@ -55,7 +43,9 @@ static int hold(struct bus *bus, const struct bus_options *options, struct link_
             end_us = report->time_us + (int64_t)(1e6 * options->duration_s);
             say_held(options, report);
         }
-        if (!moves(report->status.state) || (end_us == INT64_MAX && is_unanswered(&asked, report->time_us - start_us))) {
+        /* a report may have waited here while this host did something else: both clocks must say that it is late */
+        const bool late = report->time_us - start_us > WITHIN_US && program_now_us() - asked_us > WITHIN_US;
+        if (!moves(report->status.state) || (end_us == INT64_MAX && late)) {
             return program_fail(EXIT_REFUSED, "the controller is in %s and does not hold",
                                 supervisor_state_name(report->status.state));
         }

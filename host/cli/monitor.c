@@ -75,12 +75,6 @@ static const struct argp parser = {
     NULL,
     NULL};
 
-static int64_t now_us(void) {
-    struct timespec now;
-    (void)clock_gettime(CLOCK_MONOTONIC, &now);
-    return (int64_t)now.tv_sec * 1000000 + now.tv_nsec / 1000;
-}
-
 /* --- the screen */
 
 static void draw_bar(double pressure_pa, double target_pa, double full_pa) {
@@ -171,7 +165,7 @@ static void draw_counters(const struct monitor *monitor) {
 }
 
 static void draw(struct monitor *monitor) {
-    const int64_t time_us = now_us();
+    const int64_t time_us = program_now_us();
     if (monitor->arguments->json) {
         json_t *object = report_json(monitor->bus, &monitor->report);
         (void)json_dumpf(object, stdout, JSON_COMPACT | JSON_REAL_PRECISION(9));
@@ -237,7 +231,7 @@ static void take_report(struct monitor *monitor, int64_t start_us) {
     }
     (void)bus->link.receive(bus->link.context, &monitor->report);
     monitor->reports++;
-    const int64_t ahead_us = monitor->report.time_us - (now_us() - start_us);
+    const int64_t ahead_us = monitor->report.time_us - (program_now_us() - start_us);
     if (ahead_us > 0) {
         const struct timespec pause = {.tv_nsec = ahead_us % 1000000 * 1000};
         (void)nanosleep(&pause, NULL);
@@ -246,12 +240,12 @@ static void take_report(struct monitor *monitor, int64_t start_us) {
 
 static int watch(struct monitor *monitor, bool keys) {
     const double duration_s = monitor->arguments->bus.duration_s;
-    const int64_t start_us = now_us();
+    const int64_t start_us = program_now_us();
     const int64_t end_us = duration_s > 0.0 ? start_us + (int64_t)(1e6 * duration_s) : INT64_MAX;
     monitor->drawn_us = start_us;
-    while (program_interrupted == 0 && now_us() < end_us && (!keys || take_key(monitor))) {
+    while (program_interrupted == 0 && program_now_us() < end_us && (!keys || take_key(monitor))) {
         take_report(monitor, start_us);
-        if (now_us() >= monitor->drawn_us + DRAW_US) {
+        if (program_now_us() >= monitor->drawn_us + DRAW_US) {
             draw(monitor);
         }
     }

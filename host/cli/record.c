@@ -2,7 +2,6 @@
 #include <inttypes.h>
 #include <stdio.h>
 #include <string.h>
-#include <time.h>
 
 #include "cli/commands.h"
 #include "cli/report_json.h"
@@ -57,12 +56,9 @@ static const struct argp parser = {options,
                                    NULL};
 
 /* On a bus the clock on the wall says when it is over: the board's stands still while the board is away. */
-static bool is_over(const struct bus *bus, const struct bus_options *bus_options, const struct timespec *from,
-                    int64_t since_us) {
-    struct timespec now;
-    (void)clock_gettime(CLOCK_MONOTONIC, &now);
-    const double wall_s = (double)(now.tv_sec - from->tv_sec) + 1e-9 * (double)(now.tv_nsec - from->tv_nsec);
-    return (bus->can != NULL ? wall_s : 1e-6 * (double)since_us) >= bus_options->duration_s;
+static bool is_over(const struct bus *bus, const struct bus_options *bus_options, int64_t from_us, int64_t since_us) {
+    const int64_t wall_us = program_now_us() - from_us;
+    return 1e-6 * (double)(bus->can != NULL ? wall_us : since_us) >= bus_options->duration_s;
 }
 
 /* A board that is gone may come back, and its rows go on. False: the simulation ended. */
@@ -83,15 +79,14 @@ static bool take_row(struct bus *bus, const struct bus_options *bus_options, str
 /* Until the time is over, or Ctrl-C; an exit code. */
 static int follow(struct bus *bus, const struct bus_options *bus_options, struct run_log_writer *log,
                   uint64_t *rows, struct link_report *report) {
-    struct timespec from;
+    const int64_t from_us = program_now_us();
     int64_t start_us = -1;
-    (void)clock_gettime(CLOCK_MONOTONIC, &from);
     do {
         if (!take_row(bus, bus_options, log, rows, report)) {
             return bus_gone(bus, bus_options);
         }
         start_us = start_us < 0 && *rows > 0 ? report->time_us : start_us;
-    } while (!is_over(bus, bus_options, &from, report->time_us - start_us) && program_interrupted == 0);
+    } while (!is_over(bus, bus_options, from_us, report->time_us - start_us) && program_interrupted == 0);
     return program_interrupted == 0 ? EXIT_OK : EXIT_INTERRUPTED;
 }
 

@@ -4,6 +4,7 @@
 #include <time.h>
 
 #include "control/crc32.h"
+#include "program/program.h"
 
 #define ANSWER_US 150000
 #define SAVE_US 5000000
@@ -17,12 +18,6 @@
 #define RESET_US 3000000
 #define RESET_SLICE_US 100000
 
-static int64_t now_us(void) {
-    struct timespec now;
-    (void)clock_gettime(CLOCK_MONOTONIC, &now);
-    return (int64_t)now.tv_sec * 1000000 + now.tv_nsec / 1000;
-}
-
 static void pause_us(int64_t us) {
     const struct timespec pause = {.tv_sec = us / 1000000, .tv_nsec = us % 1000000 * 1000};
     (void)nanosleep(&pause, NULL);
@@ -33,9 +28,9 @@ static void pause_us(int64_t us) {
 /* An answer that belongs to this request. */
 static bool await(struct can_link *link, int64_t timeout_us, uint32_t parameter, uint32_t action,
                   struct message_parameter_value *value) {
-    const int64_t due_us = now_us() + timeout_us;
+    const int64_t due_us = program_now_us() + timeout_us;
     struct can_link_answer answer;
-    for (int64_t left_us = timeout_us; left_us > 0; left_us = due_us - now_us()) {
+    for (int64_t left_us = timeout_us; left_us > 0; left_us = due_us - program_now_us()) {
         if (!can_link_answer(link, left_us, &answer)) {
             return false;
         }
@@ -114,7 +109,7 @@ struct sending {
 
 /* The board's steps go on while we sleep too long: what was late is made up, within its queue. */
 static void keep_pace(struct sending *sending) {
-    const int64_t time_us = now_us();
+    const int64_t time_us = program_now_us();
     sending->due_us += CHUNK_US;
     if (sending->due_us < time_us - LATE_US) {
         sending->due_us = time_us - LATE_US;
@@ -143,7 +138,7 @@ static bool hear(struct sending *sending, int64_t timeout_us) {
         return false;
     }
     sending->last = answer.message.transfer_state;
-    sending->heard_us = now_us();
+    sending->heard_us = program_now_us();
     sending->transfer->sent = sending->last.offset < sending->bytes ? sending->last.offset : sending->bytes;
     sending->transfer->error = (enum transfer_error)sending->last.error;
     sending->transfer->state = (enum transfer_state)sending->last.state;
@@ -160,8 +155,8 @@ static enum can_board_result begin(struct sending *sending, enum transfer_kind k
     can_link_forget_answers(sending->link);
     for (int i = 0; i < TIMES; i++) {
         (void)can_link_post(sending->link, MESSAGE_TRANSFER_BEGIN, &message);
-        const int64_t due_us = now_us() + NUDGE_US;
-        for (int64_t left_us = NUDGE_US; left_us > 0; left_us = due_us - now_us()) {
+        const int64_t due_us = program_now_us() + NUDGE_US;
+        for (int64_t left_us = NUDGE_US; left_us > 0; left_us = due_us - program_now_us()) {
             if (!hear(sending, left_us)) {
                 continue;
             }
@@ -195,7 +190,7 @@ static void go_back(struct sending *sending) {
 /* All of the data; the end is not said yet. */
 static enum can_board_result stream(struct sending *sending, bool (*progress)(void *, uint32_t, uint32_t),
                                     void *context) {
-    sending->heard_us = now_us();
+    sending->heard_us = program_now_us();
     follow(sending);
     while (sending->last.offset < sending->bytes) {
         while (hear(sending, 0)) {
@@ -211,7 +206,7 @@ static enum can_board_result stream(struct sending *sending, bool (*progress)(vo
             send_chunk(sending);
         } else if (hear(sending, NUDGE_US)) {
             follow(sending);
-        } else if (now_us() - sending->heard_us > TRANSFER_PATIENCE_US) {
+        } else if (program_now_us() - sending->heard_us > TRANSFER_PATIENCE_US) {
             return CAN_BOARD_SILENT;
         } else {
             go_back(sending);
@@ -222,7 +217,7 @@ static enum can_board_result stream(struct sending *sending, bool (*progress)(vo
 
 static enum can_board_result end(struct sending *sending) {
     const union message message = {.transfer_end = {.crc = crc32_update(0u, sending->image, sending->bytes)}};
-    sending->heard_us = now_us();
+    sending->heard_us = program_now_us();
     do {
         if (sending->last.state == TRANSFER_RECEIVING) {
             (void)can_link_post(sending->link, MESSAGE_TRANSFER_END, &message);
@@ -234,7 +229,7 @@ static enum can_board_result end(struct sending *sending) {
         if (has_failed(sending)) {
             return CAN_BOARD_REFUSED;
         }
-    } while (now_us() - sending->heard_us < TRANSFER_PATIENCE_US);
+    } while (program_now_us() - sending->heard_us < TRANSFER_PATIENCE_US);
     return CAN_BOARD_SILENT;
 }
 
@@ -255,11 +250,11 @@ bool can_board_reset(struct can_link *link, struct can_link_identity *identity) 
     const union message message = {.reset = {.key = MESSAGE_RESET_KEY}};
     struct can_link_counters before, now;
     can_link_count(link, &before);
-    const int64_t due_us = now_us() + RESET_US;
+    const int64_t due_us = program_now_us() + RESET_US;
     do {
         (void)can_link_post(link, MESSAGE_RESET, &message);
         pause_us(RESET_SLICE_US);
         can_link_count(link, &now);
-    } while (now.restarts == before.restarts && now_us() < due_us);
+    } while (now.restarts == before.restarts && program_now_us() < due_us);
     return now.restarts != before.restarts && can_link_identify(link, RESET_US, identity);
 }

@@ -13,6 +13,7 @@
 #include <unistd.h>
 
 #include "comms/node.h"
+#include "program/program.h"
 
 #define TICK_US 5000
 #define HEARTBEAT_US 50000
@@ -34,12 +35,6 @@
 #define ALL_OF_IDENTITY (ALL_PIECES | IDENTITY_HEAD | IDENTITY_HASH)
 #define PROTOCOL_MASK 15u
 
-static int64_t now_us(void) {
-    struct timespec now;
-    (void)clock_gettime(CLOCK_MONOTONIC, &now);
-    return (int64_t)now.tv_sec * 1000000 + now.tv_nsec / 1000;
-}
-
 /* --- frames out; the lock is held */
 
 static bool lose_bus(struct can_link *link) {
@@ -47,7 +42,7 @@ static bool lose_bus(struct can_link *link) {
     transport_close(&link->transport);
     link->connected = false;
     link->pause_us = PAUSE_LEAST_US;
-    link->reopen_us = now_us() + link->pause_us;
+    link->reopen_us = program_now_us() + link->pause_us;
     return false;
 }
 
@@ -205,7 +200,7 @@ static void forget_identity(struct can_link *link) {
 /* The board may take our first command for an old one of the host before us. */
 static void take_refusal(struct can_link *link, const struct message_refusals *refusal) {
     if (refusal->count > 0 && refusal->reason == NODE_REFUSED_STALE && link->commanded_us > 0 &&
-        command_sequence_refused(&link->sequence, refusal->step, (uint16_t)link->assembly.step, now_us())) {
+        command_sequence_refused(&link->sequence, refusal->step, (uint16_t)link->assembly.step, program_now_us())) {
         link->repeat_us = 0;
     }
 }
@@ -215,7 +210,7 @@ static void take_message(struct can_link *link, enum message_id id, const union 
     link->counters.decoded++;
     link->latest[id] = *message;
     link->count[id]++;
-    link->heard_us = now_us();
+    link->heard_us = program_now_us();
     if (link->silent) {
         link->silent = false;
         forget_identity(link);
@@ -246,7 +241,7 @@ static void take_other_host(struct can_link *link, enum message_id id, const str
         frame->length != message_row(id)->bytes) {
         return;
     }
-    command_sequence_pass(&link->sequence, frame->data[0], is_kept_alive(&link->command), now_us());
+    command_sequence_pass(&link->sequence, frame->data[0], is_kept_alive(&link->command), program_now_us());
     while (link->sequence.leaps > 0) {
         (void)send_message(link, MESSAGE_HOST_HEARTBEAT, &nothing);
     }
@@ -331,7 +326,7 @@ static void notice_silence(struct can_link *link, int64_t time_us) {
 
 /* True: frames are waiting already. */
 static bool turn(struct can_link *link) {
-    const int64_t time_us = now_us();
+    const int64_t time_us = program_now_us();
     bool more = false;
     if (!link->connected) {
         reopen(link, time_us);
@@ -409,7 +404,7 @@ bool can_link_open(struct can_link *link, const char *bus, uint32_t node, char *
     link->wake = link->timer = -1;
     link->heartbeat_period_us = HEARTBEAT_US;
     link->start_us = START_US;
-    command_sequence_start(&link->sequence, (uint8_t)now_us());
+    command_sequence_start(&link->sequence, (uint8_t)program_now_us());
     can_assembly_init(&link->assembly);
     if (snprintf(link->bus, sizeof link->bus, "%s", bus) >= (int)sizeof link->bus) {
         (void)snprintf(error, error_bytes, "bus %s: its name is too long", bus);
@@ -443,7 +438,7 @@ void can_link_close(struct can_link *link) {
 /* --- the caller's side */
 
 static struct timespec deadline(int64_t timeout_us) {
-    const int64_t due_us = now_us() + timeout_us;
+    const int64_t due_us = program_now_us() + timeout_us;
     return (struct timespec){.tv_sec = due_us / 1000000, .tv_nsec = due_us % 1000000 * 1000};
 }
 
@@ -491,7 +486,7 @@ void can_link_command(struct can_link *link, const struct controller_command *co
     (void)pthread_mutex_lock(&link->lock);
     if (!is_same(command, &link->command) || !is_kept_alive(command)) {
         link->command = *command;
-        link->commanded_us = now_us();
+        link->commanded_us = program_now_us();
         link->repeat_us = link->commanded_us + REPEAT_US;
         link->heartbeat_us = link->commanded_us + link->heartbeat_period_us;
         link->times_sent = send_command(link) ? 1u : 0u;
@@ -545,7 +540,7 @@ void can_link_count(struct can_link *link, struct can_link_counters *counters) {
 
 int64_t can_link_silence_us(struct can_link *link) {
     (void)pthread_mutex_lock(&link->lock);
-    const int64_t silence_us = link->heard_us == 0 ? -1 : now_us() - link->heard_us;
+    const int64_t silence_us = link->heard_us == 0 ? -1 : program_now_us() - link->heard_us;
     (void)pthread_mutex_unlock(&link->lock);
     return silence_us;
 }

@@ -5,6 +5,7 @@
 #include <stdarg.h>
 #include <stdio.h>
 #include <string.h>
+#include <time.h>
 #include <unistd.h>
 
 #include "program/version.h"
@@ -98,4 +99,10 @@ int program_run(const char *name, const struct program_subcommand *subcommands, 
     (void)program_fail(EXIT_USAGE, "there is no subcommand '%s'", argv[1]);
     print_help(stderr, subcommands, count);
     return EXIT_USAGE;
+}
+
+int64_t program_now_us(void) {
+    struct timespec now;
+    (void)clock_gettime(CLOCK_MONOTONIC, &now);
+    return (int64_t)now.tv_sec * 1000000 + now.tv_nsec / 1000;
 }

@@ -5,6 +5,7 @@
 #include <signal.h>
 #include <stdbool.h>
 #include <stddef.h>
+#include <stdint.h>
 
 /* What an exit code means, a row each; the man page's table comes from here. */
 #define PROGRAM_EXITS(X)                                                                                                  \
@@ -41,6 +42,8 @@ int program_fail(int code, const char *format, ...) __attribute__((format(printf
 /* Set by Ctrl-C or SIGTERM once program_catch_interrupt() was called. A second one ends the program at once. */
 extern volatile sig_atomic_t program_interrupted;
 void program_catch_interrupt(void);
+/* Microseconds of a clock that nobody sets. */
+int64_t program_now_us(void);
 /* A file that comes with tribend: `relative` below the working directory, else below the program's folder, the folder above, or
  * share/tribend there, where it is installed. */
 void program_find(const char *relative, char path[PROGRAM_PATH_BYTES]);

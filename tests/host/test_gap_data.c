@@ -15,7 +15,7 @@ static double in_steps(double value, double step) {
     return step * round(value / step);
 }
 
-/* A sensor of 100 Hz with steps and no noise, whose tip swings by so much about `turn_rad` while it moves `move_m`. */
+/* Of a sensor of 100 Hz with steps and no noise, whose tip swings to and fro by these amplitudes. */
 static struct gap_repeats repeats_of(double turn_rad, double move_m, bool repeats) {
     char path[SCRATCH_BYTES], error[512];
     struct gap_data data;
@@ -48,7 +48,7 @@ static void repeats_show_while_the_tip_moves(void **state) {
     assert_true(repeats_of(1.0, 0.04, false).share < 0.02);
 }
 
-/* A tip that moves by less than steps can tell turns by more. */
+/* The orientation has finer steps, for what it turns by, than the position for what it moves by. */
 static void repeats_of_a_slow_tip_show_in_its_orientation(void **state) {
     (void)state;
     assert_close(repeats_of(0.4, 0.01, true).share, 1.0 / EVERY, 0.02);

@@ -1,12 +1,12 @@
 /* Boards for tests of the host's side: the real firmware node on the simulated HAL, in real time, behind a
  * Unix socket or a pseudo-terminal that speaks SLCAN.
  *
- *     board_stub [-n NODE]... [-p PROTOCOL] [-t TABLE] [-l] PATH
+ *     board_stub [-n NODE]... [-p PROTOCOL] [-t TABLE] [-d DELAY] [-l] PATH
  *
  * A line on standard output for every change of state: time, node, state, faults and the plant's greatest
  * pressure. SIGUSR1 cuts the bus or mends it; a reset is obeyed; what a board stores lasts as long as this
- * program. -p   claim to speak another version of the protocol -l   PATH becomes a link to the terminal of an
- * SLCAN adapter */
+ * program. -p   claim to speak another version of the protocol -d   so many milliseconds pass before a board has
+ * what a host sent -l   PATH becomes a link to the terminal of an SLCAN adapter */
 #include <errno.h>
 #include <fcntl.h>
 #include <math.h>
@@ -57,6 +57,12 @@ static bool is_slcan;
 static struct slcan_reader reader;
 static const struct bend_table *module_table;
 static uint32_t protocol = MESSAGE_PROTOCOL;
+static struct delayed {
+    struct hal_can_frame frame;
+    uint64_t due; /* step */
+} delayed[QUEUE];
+static size_t first_delayed, delayed_count;
+static uint64_t steps, delay;
 static volatile sig_atomic_t cut, ended;
 
 /* --- the bus */
@@ -87,7 +93,8 @@ static void claim_protocol(struct hal_can_frame *frame) {
     }
 }
 
-static void give_hosts(const struct hal_can_frame *frame) {
+/* All but the sender hear it, as on any bus. */
+static void give_hosts(const struct hal_can_frame *frame, const char *sender) {
     struct canfd_frame can;
     char line[SLCAN_LINE_BYTES];
     if (is_slcan) {
@@ -97,8 +104,8 @@ static void give_hosts(const struct hal_can_frame *frame) {
     }
     const size_t bytes = socketcan_from_frame(frame, &can);
     for (size_t h = 0; h < host_count; h++) {
-        if (sendto(bus, &can, bytes, MSG_DONTWAIT, (struct sockaddr *)&hosts[h], sizeof hosts[h]) < 0 &&
-            errno != EAGAIN) {
+        if (strcmp(hosts[h].sun_path, sender) != 0 &&
+            sendto(bus, &can, bytes, MSG_DONTWAIT, (struct sockaddr *)&hosts[h], sizeof hosts[h]) < 0 && errno != EAGAIN) {
             hosts[h--] = hosts[--host_count]; /* that host is gone */
         }
     }
@@ -114,7 +121,7 @@ static bool send_out(void *context, const struct hal_can_frame *frame) {
         }
     }
     if (!cut) {
-        give_hosts(&claimed);
+        give_hosts(&claimed, "");
     }
     return true;
 }
@@ -124,9 +131,18 @@ static void say_state(void *context, struct hal_can_state *state) {
     *state = (struct hal_can_state){.receive_lost = board->lost};
 }
 
-static void give_boards(const struct hal_can_frame *frame) {
-    for (size_t b = 0; b < board_count && !cut; b++) {
-        queue_frame(&boards[b], frame);
+static void take_from_host(const struct hal_can_frame *frame) {
+    if (!cut && delayed_count < QUEUE) {
+        delayed[(first_delayed + delayed_count++) % QUEUE] = (struct delayed){*frame, steps + delay};
+    }
+}
+
+static void give_boards(void) {
+    for (; delayed_count > 0 && delayed[first_delayed].due <= steps; delayed_count--) {
+        for (size_t b = 0; b < board_count; b++) {
+            queue_frame(&boards[b], &delayed[first_delayed].frame);
+        }
+        first_delayed = (first_delayed + 1) % QUEUE;
     }
 }
 
@@ -154,7 +170,10 @@ static void take_socket(void) {
             remember_host(&host);
         }
         if (socketcan_to_frame(&can, (size_t)size, &frame)) {
-            give_boards(&frame.frame);
+            take_from_host(&frame.frame);
+            if (!cut) {
+                give_hosts(&frame.frame, host.sun_path);
+            }
         }
         host_bytes = sizeof host;
     }
@@ -166,7 +185,7 @@ static void take_terminal(void) {
     const ssize_t count = read(bus, bytes, sizeof bytes);
     for (ssize_t i = 0; i < count; i++) {
         if (slcan_take(&reader, bytes[i], &frame) == SLCAN_FRAME) {
-            give_boards(&frame);
+            take_from_host(&frame);
         }
     }
 }
@@ -285,9 +304,11 @@ static void run(void) {
         } else {
             take_socket();
         }
+        give_boards();
         for (size_t b = 0; b < board_count; b++) {
             step(&boards[b]);
         }
+        steps++;
         pace(&due);
     }
 }
@@ -297,11 +318,13 @@ int main(int argc, char **argv) {
     uint32_t ids[BOARDS_MOST] = {1};
     size_t count = 0;
     static struct table_file file;
-    for (int option = getopt(argc, argv, "n:p:t:l"); option != -1; option = getopt(argc, argv, "n:p:t:l")) {
+    for (int option = getopt(argc, argv, "n:p:t:d:l"); option != -1; option = getopt(argc, argv, "n:p:t:d:l")) {
         if (option == 'n' && count < BOARDS_MOST) {
             ids[count++] = (uint32_t)strtoul(optarg, NULL, 10);
         } else if (option == 'p') {
             protocol = (uint32_t)strtoul(optarg, NULL, 10);
+        } else if (option == 'd') {
+            delay = strtoul(optarg, NULL, 10);
         } else if (option == 't') {
             table = optarg;
         } else {
